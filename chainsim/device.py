@@ -1,0 +1,187 @@
+"""The hardware as built: one `Device`, read from a YAML profile; the only place where SI meets dimensionless."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from .chain import Chain, Closure
+from .errors import ProfileError
+from .yamlfile import read_model
+
+__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+
+PROFILES = Path(__file__).parent / "profiles"
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=1024)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Span(_Part):
+    """A closed range of what a device can set."""
+
+    min: NotNegative
+    max: NotNegative
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Span:
+        if self.min > self.max:
+            raise ValueError(f"min {self.min} is above max {self.max}; swap them")
+        return self
+
+
+class Coupling(_Part):
+    """How actuators of a chain are coupled.
+
+    `scope` is what one lam belongs to: every link has its own (`link`), one for a chain (`chain`), one
+    for the whole device (`device`), or the actuators are not coupled (`none`).
+    """
+
+    closure: Closure = Closure.OPEN
+    scope: Literal["none", "device", "chain", "link"]
+    lam: Span = Span(min=0.0, max=0.0)
+
+    @model_validator(mode="after")
+    def _uncoupled_has_no_lam(self) -> Coupling:
+        if self.scope == "none" and self.lam.max > 0:
+            raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
+        return self
+
+
+class Amplifier(_Part):
+    """What every output channel can do."""
+
+    volts: Positive
+    slew_v_per_s: Positive
+    rate_hz: Annotated[int, Field(ge=100, le=10_000_000)]
+
+
+class Note(_Part):
+    """Where a value of the profile comes from."""
+
+    assumed: bool
+    why: Annotated[str, Field(min_length=1)]
+
+
+class Device(_Part):
+    """A grid of actuators, its chains, its drive and its amplifier.
+
+    Each row is cut into chains of `chain_length` actuators, which must divide `cols`; the first actuator
+    of every chain is driven. A dimensionless amplitude z is ``z * length_m`` metres; the target 1 of a
+    pattern is the amplitude `full_scale`.
+
+    Attributes
+    ----------
+    rows, cols : size of the grid. `pitch_m` : distance between neighbours in metres.
+    f0_hz : resonance of one actuator in hertz; tau = 2 pi f0_hz t.
+    delta, beta : damping and cubic term of `chainsim.Chain`.
+    length_m : metres per unit of z.
+    full_scale : dimensionless amplitude of target 1.
+    epsilon_per_volt, bias_per_volt : dimensionless force per volt at the actuator (drive, bias).
+    omega : drive frequencies the device can make, over f0.
+    bias : whether every actuator has its own DC bias channel.
+    notes : field name -> where the value comes from.
+    """
+
+    schema_: Literal["dotwave/device/1"] = Field("dotwave/device/1", alias="schema")
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    description: str = ""
+    rows: Count
+    cols: Count
+    chain_length: Count
+    pitch_m: Positive
+    f0_hz: Positive
+    delta: Annotated[float, Field(gt=0, lt=1)]
+    beta: Finite
+    length_m: Positive
+    full_scale: Positive
+    epsilon_per_volt: Positive
+    bias_per_volt: Positive
+    omega: Span
+    coupling: Coupling
+    bias: Literal["none", "actuator"]
+    amplifier: Amplifier
+    notes: dict[str, Note] = {}
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Device:
+        if self.cols % self.chain_length:
+            raise ValueError(f"chain_length {self.chain_length} does not divide cols {self.cols}")
+        if self.omega.min <= 0:
+            raise ValueError("omega.min must be above 0")
+        if self.coupling.scope == "none" and self.chain_length > 1:
+            raise ValueError("coupling.scope none needs chain_length 1")
+        unknown = sorted(set(self.notes) - set(type(self).model_fields))
+        if unknown:
+            raise ValueError(f"notes.{unknown[0]}: the profile has no such field")
+        if self.beta < 0 and self.full_scale >= self.escape_amplitude:
+            raise ValueError(
+                f"full_scale {self.full_scale} is beyond the softening hilltop {self.escape_amplitude:.4g}"
+            )
+        return self
+
+    @property
+    def chains_per_row(self) -> int:
+        """How many chains a row has."""
+        return self.cols // self.chain_length
+
+    @property
+    def chain(self) -> Chain:
+        """One chain of the device, for the solvers."""
+        return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure)
+
+    @property
+    def escape_amplitude(self) -> float:
+        """Dimensionless hilltop sqrt(1/|beta|) of an uncoupled actuator; infinite unless beta < 0."""
+        return math.sqrt(-1.0 / self.beta) if self.beta < 0 else math.inf
+
+    @property
+    def tau_per_s(self) -> float:
+        """tau = tau_per_s * t."""
+        return 2 * math.pi * self.f0_hz
+
+    @property
+    def epsilon_max(self) -> float:
+        """Largest dimensionless drive the amplifier can give."""
+        return self.amplifier.volts * self.epsilon_per_volt
+
+    @property
+    def bias_max(self) -> float:
+        """Largest dimensionless bias the amplifier can give."""
+        return self.amplifier.volts * self.bias_per_volt
+
+    def as_dict(self) -> dict[str, Any]:
+        """The whole profile in plain JSON types, as it stands in a manifest."""
+        return self.model_dump(mode="json", by_alias=True)
+
+
+def device_names() -> list[str]:
+    """Names of the built-in profiles, sorted."""
+    return sorted(path.stem for path in PROFILES.glob("*.yaml"))
+
+
+@cache
+def load_device(name: str) -> Device:
+    """A built-in profile by name, or the profile in the YAML file of that path.
+
+    Raises
+    ------
+    ProfileError
+        When there is no such profile or file, or the file does not fit; the message says where.
+    """
+    if name in device_names():
+        return read_model(PROFILES / f"{name}.yaml", Device)
+    path = Path(name)
+    if path.suffix.lower() in {".yaml", ".yml"} or path.is_file():
+        return read_model(path, Device)
+    raise ProfileError(f"device {name!r}: not a built-in profile ({', '.join(device_names())}) and not a .yaml file")

@@ -1,0 +1,143 @@
+"""Strict reading of the YAML files people write: every complaint names file, line and field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from .errors import ProfileError
+
+__all__ = ["parse_model", "read_model"]
+
+Model = TypeVar("Model", bound=BaseModel)
+Place = tuple[str | int, ...]
+MAX_BYTES = 4_000_000
+
+
+def read_model(path: Path, model: type[Model]) -> Model:
+    """Read the YAML file `path` as one `model`.
+
+    Raises
+    ------
+    ProfileError
+        When the file cannot be read, is not YAML, or does not fit the model.
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise ProfileError(f"{path}: {error.strerror or error}") from None
+    if len(raw) > MAX_BYTES:
+        raise ProfileError(f"{path}: {len(raw)} bytes; such a file has at most {MAX_BYTES}")
+    try:
+        return parse_model(raw.decode("utf-8-sig"), str(path), model)
+    except UnicodeDecodeError as error:
+        raise ProfileError(f"{path}: not UTF-8 at byte {error.start}; save it as UTF-8") from None
+
+
+def parse_model(text: str, name: str, model: type[Model]) -> Model:
+    """Read YAML `text` as one `model`; `name` stands for the file in messages.
+
+    Raises
+    ------
+    ProfileError
+        When the text is not YAML or does not fit the model.
+    """
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ProfileError(_yaml_complaint(name, error)) from None
+    except (ValueError, RecursionError) as error:
+        raise ProfileError(f"{name}: not readable as YAML: {error}") from None
+    if not isinstance(data, dict):
+        raise ProfileError(f"{name}:1: expected keys and values ('key: value'), got {_shown(data)}")
+    lines = _lines(root)
+    repeated = lines.pop(("repeated",), None)
+    if repeated is not None:
+        raise ProfileError(f"{name}:{repeated}: a key is given twice in the same section; keep one")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ProfileError(_model_complaint(name, lines, error)) from None
+
+
+def _yaml_complaint(name: str, error: yaml.YAMLError) -> str:
+    mark = getattr(error, "problem_mark", None)
+    place = f"{name}:{mark.line + 1}" if mark is not None else name
+    problem = getattr(error, "problem", None) or "a character YAML does not allow"
+    return f"{place}: not YAML: {problem}"
+
+
+def _lines(root: yaml.Node | None) -> dict[Place, int]:
+    """Line number of every key and item; the pseudo-place ('repeated',) holds a key given twice."""
+    found: dict[Place, int] = {}
+    seen: set[int] = set()
+
+    def walk(node: yaml.Node | None, place: Place) -> None:
+        if node is None or id(node) in seen:
+            return
+        seen.add(id(node))
+        found.setdefault(place, node.start_mark.line + 1)
+        if isinstance(node, yaml.MappingNode):
+            keys = [key.value for key, _ in node.value]
+            for key, value in node.value:
+                if keys.count(key.value) > 1:
+                    found[("repeated",)] = key.start_mark.line + 1
+                found[(*place, key.value)] = key.start_mark.line + 1
+                walk(value, (*place, key.value))
+        elif isinstance(node, yaml.SequenceNode):
+            for index, value in enumerate(node.value):
+                found[(*place, index)] = value.start_mark.line + 1
+                walk(value, (*place, index))
+
+    walk(root, ())
+    return found
+
+
+def _model_complaint(name: str, lines: dict[Place, int], error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    place = tuple(first["loc"])
+    known = place
+    while known and known not in lines:
+        known = known[:-1]
+    field = ".".join(str(part) for part in place) or "file"
+    return f"{name}:{lines.get(known, 1)}: {field}: {_sentence(first)}"
+
+
+_EXPECTED = {
+    "missing": "this key is required and missing",
+    "extra_forbidden": "unknown key; remove it or correct its spelling",
+    "int_parsing": "expected a whole number, got {value}",
+    "int_type": "expected a whole number, got {value}",
+    "int_from_float": "expected a whole number, got {value}",
+    "float_parsing": "expected a number, got {value}",
+    "float_type": "expected a number, got {value}",
+    "finite_number": "expected a finite number, got {value}",
+    "greater_than": "expected a number > {gt}, got {value}",
+    "greater_than_equal": "expected a number >= {ge}, got {value}",
+    "less_than": "expected a number < {lt}, got {value}",
+    "less_than_equal": "expected a number <= {le}, got {value}",
+    "string_type": "expected text, got {value}",
+    "list_type": "expected a list, got {value}",
+    "model_type": "expected keys and values, got {value}",
+    "bool_parsing": "expected true or false, got {value}",
+    "literal_error": "expected {expected}, got {value}",
+    "enum": "expected {expected}, got {value}",
+}
+
+
+def _sentence(error: Any) -> str:
+    kind = error["type"]
+    context = dict(error.get("ctx", {}))
+    context["value"] = _shown(error["input"])
+    if kind in _EXPECTED:
+        return _EXPECTED[kind].format(**context)
+    return str(error["msg"]).removeprefix("Value error, ")
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

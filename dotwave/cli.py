@@ -1,0 +1,5 @@
+"""The command line (grows below)."""
+
+
+def main() -> None:
+    """Entry point."""

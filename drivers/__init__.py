@@ -1,0 +1,1 @@
+"""How a plan gets to the hardware: waveforms, files and sinks."""

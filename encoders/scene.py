@@ -1,0 +1,84 @@
+"""What should be felt: targets, frames and scenes, in plain numbers and free of any hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Frame", "GridShape", "PatternKind", "Scene", "TargetPattern"]
+
+
+@dataclass(frozen=True)
+class GridShape:
+    """Rows and columns of actuators that a scene is laid out for."""
+
+    rows: int
+    cols: int
+
+
+class PatternKind(StrEnum):
+    """What sort of pattern a target is."""
+
+    ON_OFF = "on_off"
+    SINE = "sine"
+    BARS = "bars"
+
+
+@dataclass(frozen=True)
+class TargetPattern:
+    """A wish for one moment.
+
+    Attributes
+    ----------
+    amplitude : complex128, shape (rows, cols), read-only, modulus 0..1 (1 = the device's full scale).
+    kind : on/off, sine or bars.
+    weight : float64, shape (rows, cols), 0 = don't care; None means 1 everywhere.
+    phase_matters : whether the arguments of `amplitude` are part of the wish.
+    """
+
+    amplitude: NDArray[np.complex128]
+    kind: PatternKind = PatternKind.ON_OFF
+    weight: NDArray[np.float64] | None = None
+    phase_matters: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A pattern and how long it is shown.
+
+    Attributes
+    ----------
+    pattern : the wish.
+    dwell_s : seconds the frame lasts, from the start of its ramp to its end.
+    page : which page it belongs to; the parts of one page (`by-row`, `by-dot`) are superposed by a reader.
+    text : the span of source text it shows; `span` is its (start, end) in characters.
+    cells : the page's cells as Unicode Braille, lines separated by a newline; empty when blank.
+    """
+
+    pattern: TargetPattern
+    dwell_s: float
+    page: int = 0
+    text: str = ""
+    span: tuple[int, int] = (0, 0)
+    cells: str = ""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A sequence of frames, made lazily: iterating `frames` again encodes again.
+
+    Attributes
+    ----------
+    shape : the grid it is laid out for.
+    frames : iterable of `Frame`.
+    encoding : plain JSON values that let a reader decode the frames (tables, layout, presentation).
+    """
+
+    shape: GridShape
+    frames: Iterable[Frame]
+    encoding: Mapping[str, Any] = field(default_factory=dict)
