@@ -1,5 +1,242 @@
-"""The command line (grows below)."""
+"""The command line: reads arguments, calls one function, prints.
+
+Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input, with one line
+on stderr; 130 after Ctrl-C; 143 after SIGTERM. Imports that take time stay inside the commands.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import sys
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, Protocol
+
+import typer
+
+from .errors import Terminated, bad_input
+from .options import Dots, Presentation, SampleFormat, Undefined
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="dotwave",
+    help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Device = Annotated[
+    str, typer.Option("--device", "-d", help="A built-in profile or a YAML file; see `dotwave devices`.")
+]
+Written = Annotated[str, typer.Argument(metavar="OUT", help="A waveform written by `dotwave text` (.wav or .json).")]
+GAP = "in actuators."
+CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+class Report(Protocol):
+    """What a command prints."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+        ...
+
+    def as_text(self) -> str:
+        """Lines of plain text."""
+        ...
+
+
+@app.command(short_help="Render text as Braille that can be felt.")
+def text(
+    source: Annotated[str, typer.Argument(metavar="TEXT|FILE|-", help="A file if it exists, - for stdin, else words.")],
+    device: Device = "paper-6x6",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
+    table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
+    undefined: Annotated[
+        Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
+    ] = None,
+    cell_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty columns between cells, {GAP}")] = None,
+    line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
+    rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
+    dwell: Annotated[float | None, typer.Option(help="Seconds per page, instead of --rate.")] = None,
+    presentation: Annotated[
+        Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")
+    ] = None,
+    dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
+    blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    as_json: Json = False,
+) -> None:
+    """Render text as Braille and write the waveforms that make it felt.
+
+    TEXT|FILE|-: a path that exists is read as a file (UTF-8, Unicode Braille, or .brf), - is standard
+    input, anything else is the text itself. Words with a slash or a .txt suffix and no spaces are taken
+    for a path, and refused when there is no such file.
+
+    \b
+    Example:
+      dotwave text "Hello world" --device linked-6x6 -o hello.wav
+    """
+    from .options import text_options
+    from .pipeline import render_text
+
+    options = text_options(
+        table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
+        presentation=presentation, dots=dots, blank_between=blank_between,
+    )  # fmt: skip
+    report = render_text(source, device=device, out=output, options=options, encoding=sample_format.value)
+    _finish(report, as_json, ok=report.ok)
+
+
+@app.command(short_help="Solve one chain and print its steady state.")
+def simulate(
+    chain: Annotated[
+        str, typer.Argument(metavar="CHAIN.yaml", help="The chain, its setting and a tolerance; - is stdin.")
+    ],
+) -> None:
+    """Solve a chain of coupled oscillators and print what it does, as JSON.
+
+    The file says `chain`, `setting`, `rung`, `tol` and `start`; README.md has one to copy. The exit code
+    is 1 when the outcome is not ok; the JSON is printed all the same.
+
+    \b
+    Example:
+      dotwave simulate chain.yaml
+    """
+    from chainsim import simulate as solve
+
+    from .source import simulation_source
+
+    answer = solve(simulation_source(chain))
+    typer.echo(json.dumps(answer, allow_nan=False))
+    raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
+
+
+@app.command(short_help="Say what a written waveform makes felt.")
+def verify(out: Written, as_json: Json = False) -> None:
+    """Integrate the full equations under the samples of a written waveform and say what is felt.
+
+    Reads only the samples and the manifest beside them. The exit code is 1 when a dot is wrong, a level
+    is outside its limits, or the text does not come back.
+
+    \b
+    Example:
+      dotwave verify hello.wav
+    """
+    from .verify import verify as check
+
+    report = check(Path(out))
+    _finish(report, as_json, ok=report.ok)
+
+
+@app.command(short_help="Draw and spell out what a written waveform makes felt.")
+def preview(
+    out: Written,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Start of the file names; default: OUT's own.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Verify a written waveform, then draw its frames: PNG, GIF, and the same as text for a screen reader.
+
+    Every frame shows what was wanted beside what is felt. For hello.wav it writes hello.preview.png,
+    hello.preview.gif and hello.preview.txt; with -o pictures/hello, pictures/hello.png and so on.
+
+    \b
+    Example:
+      dotwave preview hello.wav
+    """
+    from .preview import write_preview
+    from .verify import verify as check
+
+    report = write_preview(check(Path(out)), output or Path(out).with_suffix(".preview"))
+    _finish(report, as_json, ok=True)
+
+
+@app.command(short_help="List device profiles, or print one.")
+def devices(
+    name: Annotated[str | None, typer.Argument(help="One profile, or a YAML file: print every value.")] = None,
+    as_json: Json = False,
+) -> None:
+    """List the built-in device profiles, with the values that are assumed rather than given.
+
+    \b
+    Example:
+      dotwave devices linked-6x6
+    """
+    from .listing import list_devices
+
+    _finish(list_devices(name), as_json, ok=True)
+
+
+@app.command(short_help="List translation tables.")
+def tables(
+    wanted: Annotated[
+        str | None, typer.Argument(metavar="FILTER", help="Part of a file name, language or name.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the Braille tables liblouis has: file, language, grade, name.
+
+    \b
+    Example:
+      dotwave tables german
+    """
+    from .listing import list_translation_tables
+
+    _finish(list_translation_tables(wanted), as_json, ok=True)
+
+
+@app.command(short_help="Check this installation.")
+def doctor(as_json: Json = False) -> None:
+    """Check Python, the packages, liblouis, the cache and the disk, and name the cure for what is wrong.
+
+    \b
+    Example:
+      dotwave doctor
+    """
+    from .doctor import examine
+
+    report = examine()
+    _finish(report, as_json, ok=report.ok)
+
+
+def _finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
+    shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
+    typer.echo(_printable(shown))
+    raise typer.Exit(0 if ok else 1)
+
+
+def _printable(words: str) -> str:
+    """`words` without control characters, which a text could use to write over the terminal."""
+    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", words)
+
+
+def _terminate(number: int, _frame: object) -> NoReturn:
+    raise Terminated(128 + number)
 
 
 def main() -> None:
-    """Entry point."""
+    """Entry point: runs the command and turns what went wrong into an exit code."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _terminate)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # A terminal that cannot show Braille gets escapes, not a traceback.
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        app(prog_name="dotwave")
+    except SystemExit:
+        raise
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except bad_input() as error:
+        typer.echo(f"dotwave: {_printable(' '.join(str(error).split()))}", err=True)
+        sys.exit(2)

@@ -20,14 +20,20 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """How far a state stays from what it must not reach; each is a fraction, 1 = at the limit.
+    """How far a state stays from what it must not reach, and what it is sensitive to.
 
-    `volts` : peak voltage over the amplifier's. `well` : largest deflection over the static limit of the
-    softening well (0 unless beta < 0).
+    Attributes
+    ----------
+    volts : peak voltage over the amplifier's; 1 is at the limit.
+    well : largest deflection over the limit of the softening well (static fold for a bias, hilltop for a
+        vibration); 1 is at the limit, 0 unless beta < 0.
+    noise_gain : how many times more a disturbance on the drive, at the worst frequency and lasting for
+        ever, is magnified than the drive itself is, at the worst actuator; 1 where nothing vibrates.
     """
 
     volts: float
     well: float
+    noise_gain: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -58,23 +64,29 @@ class ChainState:
 
 @dataclass(frozen=True)
 class Ramp:
-    """How one chain goes from one state to the next; each control is linear between its nodes.
+    """How one chain goes from one state to the next.
+
+    Drive and bias are cubic Hermite curves between their nodes; links are linear between theirs.
 
     Attributes
     ----------
     t_s : float64, shape (K,), seconds from the start of the frame; first 0, last the ramp's length.
     epsilon : complex128, shape (K,), drive envelope: force = Re(epsilon e^{i omega tau}), tau from the
-        start of the whole plan. None when the drive stays zero.
-    bias : float64, shape (K, n), or None when no bias changes.
-    lam_t_s : float64, shape (L,); lam : float64, shape (L, n-1), the links, or None when they jump to the
-        new state's values at the start of the frame.
+        start of the whole plan; `epsilon_slope` per second. None when the drive stays zero.
+    bias : float64, shape (K, n); `bias_slope` per second. None when no bias changes.
+    lam_t_s : float64, shape (L,); lam : float64, shape (L, n-1), the links. None when they jump to the new
+        state's values at the start of the frame.
+    lacking : one clause on what the device lacks for this way, empty when it can go it.
     """
 
     t_s: Floats
     epsilon: Complexes | None = None
+    epsilon_slope: Complexes | None = None
     bias: Floats | None = None
+    bias_slope: Floats | None = None
     lam_t_s: Floats | None = None
     lam: Floats | None = None
+    lacking: str = ""
 
     @property
     def duration_s(self) -> float:

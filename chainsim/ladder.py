@@ -1,0 +1,160 @@
+"""One way in to every solver: a rung by name, or the cheapest whose error estimate meets the tolerance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .answer import Answer, response_of, stitch
+from .basis import basis_for
+from .chain import Chain, Closure, Setting
+from .harmonic_balance import balance_near
+from .response import Outcome, Response, Stats
+from .rest import sure_from_rest
+from .rung import Start, load_rung
+from .scaling import Stages
+
+__all__ = ["solve"]
+
+# Relative distance at which the answer of harmonic balance is the orbit that was integrated (known to 1e-5).
+SAME_ORBIT = 1e-2
+
+
+def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
+    """Periodic steady states of N settings.
+
+    Parameters
+    ----------
+    tol : wanted accuracy of amplitudes, relative to each setting's largest; from 1e-12 up to 1.
+    rung : a name in `RUNGS`, or ``auto``: the cheapest rung whose error estimate meets `tol`.
+    start : ``rest``, a sudden drive from z = z' = 0. ``auto`` says which answer is reached and whether the motion
+        escapes or does not lock, integrating where that is not plain; a steady rung by name gives the lower branch.
+        ``ramp``, the drive raised slowly from 0: the lower branch, `NO_CONVERGENCE` past its fold.
+        ``all``, every branch of one setting, along the batch axis, the lowest first.
+
+    Raises
+    ------
+    ValueError
+        When `tol` or `start` is none of these.
+    RungError
+        When the rung cannot answer the question; also a ValueError.
+    """
+    if not (math.isfinite(tol) and 1e-12 <= tol <= 1):
+        raise ValueError(f"tol: expected a number from 1e-12 to 1, got {tol}")
+    if start not in set(Start):
+        raise ValueError(f"start: expected one of {', '.join(Start)}, got {start!r}")
+    way = Start(start)
+    if len(setting) == 0:
+        raise ValueError("setting: expected at least one setting, got none")
+    if setting.n != chain.n:
+        raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
+    if rung != "auto":
+        return load_rung(rung).solve(chain, setting, tol=tol, start=way)
+    if not chain.beta:
+        return _linear(chain, setting, tol, way)
+    if chain.closure is Closure.RING:
+        return load_rung("ode").solve(chain, setting, tol=tol, start=way)
+    if way is Start.ALL:
+        name = "harmonic_balance" if setting.epsilon.any() else "static"
+        return load_rung(name).solve(chain, setting, tol=tol, start=way)
+    steady = _cheapest(chain, setting, tol, way)
+    return _from_rest(chain, setting, tol, steady) if way is Start.REST else steady
+
+
+def _linear(chain: Chain, setting: Setting, tol: float, start: Start) -> Response:
+    response = load_rung("linear").solve(chain, setting, tol=tol, start=start)
+    if chain.delta or start is not Start.REST:
+        return response
+    outcome = response.outcome.copy()
+    # Without damping the start-up transient never dies out.
+    outcome[outcome == Outcome.UNSTABLE] = Outcome.NOT_LOCKED
+    outcome.flags.writeable = False
+    return replace(response, outcome=outcome, locked=response.locked & (outcome != Outcome.NOT_LOCKED))
+
+
+def _cheapest(chain: Chain, setting: Setting, tol: float, start: Start) -> Response:
+    """The answer of the cheapest rung whose every estimate meets `tol`."""
+    work = Stats()
+    for name in _candidates(chain, setting, tol):
+        response = load_rung(name).solve(chain, setting, tol=tol, start=start)
+        work = work + response.stats
+        if bool((response.error_estimate <= tol).all()):
+            break
+    return replace(response, stats=work)
+
+
+def _candidates(chain: Chain, setting: Setting, tol: float) -> tuple[str, ...]:
+    """Rungs worth a try, cheapest first; the cubic's share at the first oscillator says if linear can be one."""
+    if not setting.epsilon.any():
+        return ("static",)
+    with np.errstate(all="ignore"):
+        impedance = 1 - setting.omega**2 + 1j * chain.delta * setting.omega
+        share = 0.75 * abs(chain.beta) * np.abs(setting.epsilon / impedance) ** 2 / np.abs(impedance)
+    steady = ("one_harmonic", "harmonic_balance")
+    return ("linear", *steady) if bool((share <= tol).all()) else steady
+
+
+def _from_rest(chain: Chain, setting: Setting, tol: float, steady: Response) -> Response:
+    """`steady` where it is surely reached from rest, and what an integration says elsewhere."""
+    sure = sure_from_rest(chain, setting, steady) & (steady.outcome == Outcome.OK)
+    if sure.all():
+        return steady
+    asked = np.flatnonzero(~sure)
+    parts = [(asked[index], part) for index, part in _integrated(chain, setting[asked], tol)]
+    if sure.any():
+        parts.append((np.flatnonzero(sure), _subset(steady, sure)))
+    names = {part.rung for _, part in parts}
+    whole = stitch("ode" if "ode" in names else steady.rung if len(names) > 1 else names.pop(), len(setting), parts)
+    return replace(whole, stats=whole.stats + (steady.stats if not sure.any() else Stats()))
+
+
+def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArray[np.intp], Response]]:
+    """What is reached from rest: integrated until sure, then refined by harmonic balance beside that orbit."""
+    from .ode import OdeRung, reached_from_rest, steady_from_rest
+
+    reached = reached_from_rest(chain, setting, max_periods=OdeRung.max_periods)
+    ok = reached.outcome == Outcome.OK
+    parts: list[tuple[NDArray[np.intp], Response]] = []
+    if not ok.all():
+        lost = np.flatnonzero(~ok)
+        parts.append((lost, _unanswered(chain, setting[lost], reached.outcome[lost])))
+    found = np.flatnonzero(ok)
+    if len(found):
+        phasor = reached.phasor[found]
+        near = balance_near(chain, setting[found], phasor, tol=tol)
+        with np.errstate(invalid="ignore"):
+            size = np.maximum(np.abs(phasor).max(axis=1), np.abs(near.mean).max(axis=1))
+            same = np.abs(near.phasor - phasor).max(axis=1) <= SAME_ORBIT * size
+        good = (near.outcome == Outcome.OK) & same
+        if good.any():
+            parts.append((found[good], _subset(near, good)))
+        if not good.all():
+            rest = found[~good]
+            parts.append((rest, steady_from_rest(chain, setting[rest], tol=tol, max_periods=OdeRung.max_periods)))
+    first, part = parts[0]
+    parts[0] = (first, replace(part, stats=part.stats + reached.stats))
+    return parts
+
+
+def _unanswered(chain: Chain, setting: Setting, outcome: NDArray[np.object_]) -> Response:
+    stages = Stages.of(chain, setting)
+    basis = basis_for(1, False)
+    nothing = np.full((stages.n, basis.size, len(stages)), np.nan)
+    unknown = np.full((len(stages), stages.n, 2), np.nan, dtype=np.complex128)
+    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
+    estimate = np.full(len(stages), np.inf)
+    answer = Answer(basis, nothing, outcome, branch, estimate, unknown)
+    silent = response_of(stages, "ode", answer, Stats(), 0.0)
+    return replace(silent, stats=Stats())
+
+
+def _subset(response: Response, index: NDArray[np.bool_]) -> Response:
+    return replace(
+        response,
+        outcome=response.outcome[index], harmonics=response.harmonics[index], mean=response.mean[index],
+        stable=response.stable[index], locked=response.locked[index], multipliers=response.multipliers[index],
+        branch=response.branch[index], error_estimate=response.error_estimate[index],
+    )  # fmt: skip

@@ -1,0 +1,105 @@
+"""What a solver of the ladder must supply, and the table that finds solvers by name."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from enum import StrEnum
+from importlib import import_module
+from typing import ClassVar
+
+import numpy as np
+
+from .chain import Chain, Setting
+from .errors import ChainError
+from .response import Response
+
+__all__ = ["RUNGS", "Rung", "RungError", "Start", "load_rung"]
+
+RUNGS = {
+    "static": ("chainsim.static", "StaticRung"),
+    "linear": ("chainsim.linear", "LinearRung"),
+    "one_harmonic": ("chainsim.one_harmonic", "OneHarmonicRung"),
+    "harmonic_balance": ("chainsim.harmonic_balance", "HarmonicBalanceRung"),
+    "ode": ("chainsim.ode", "OdeRung"),
+}
+
+
+class RungError(ChainError, ValueError):
+    """A rung was asked for something it cannot answer.
+
+    Examples: no rung has that name; harmonic balance of a ring; every branch of more than one setting.
+    """
+
+
+class Start(StrEnum):
+    """How the steady state is approached."""
+
+    REST = "rest"
+    RAMP = "ramp"
+    ALL = "all"
+
+
+class Rung(ABC):
+    """One way to solve a chain for its periodic steady state. This text is the guide to writing another.
+
+    A newcomer supplies
+
+    1. `name`, the key under which it stands in `RUNGS` and which it writes into `Response.rung`;
+    2. `order`, in words, how its error falls and in what; a test fits the slope;
+    3. `valid`, in words, where it is true;
+    4. `refusal`, one sentence why it cannot answer this question, or "" when it can;
+    5. `steady`, the work itself.
+
+    The base does the rest: `solve` raises the refusal as a `RungError`. Never override `solve`.
+
+    `steady` treats every setting on its own: an answer does not depend on its neighbours in the batch. A
+    solve that fails is an `Outcome` in the `Response` with NaN harmonics, never an exception and never a
+    NaN marked ok. It fills `error_estimate` honestly (at least the true error, relative to the setting's
+    largest amplitude), counts its work in `Stats`, sees no target and imports nothing heavy on import.
+
+    With start ``rest`` a rung that integrates says which answer is reached from z = z' = 0; a rung
+    that does not gives the lower branch. ``ramp`` is the lower branch as the drive grows slowly from 0,
+    ``all`` is every branch of one setting, along the batch axis.
+    """
+
+    name: ClassVar[str]
+    order: ClassVar[str]
+    valid: ClassVar[str]
+
+    @abstractmethod
+    def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
+        """Why this rung cannot answer, in one sentence that names the cure; "" when it can."""
+
+    @abstractmethod
+    def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
+        """The steady states; `tol` is relative to each setting's largest amplitude."""
+
+    def solve(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
+        """Check the question and answer it.
+
+        Raises
+        ------
+        RungError
+            With the refusal.
+        """
+        refusal = self.refusal(chain, setting, start)
+        if refusal:
+            raise RungError(f"rung {self.name}: {refusal}")
+        # A number out of range becomes an outcome, so NumPy need not warn of it.
+        with np.errstate(all="ignore"):
+            return self.steady(chain, setting, tol=tol, start=start)
+
+
+def load_rung(name: str) -> Rung:
+    """The rung of that name, its module imported only now.
+
+    Raises
+    ------
+    RungError
+        When there is no such rung.
+    """
+    if name not in RUNGS:
+        raise RungError(f"rung {name!r}: expected one of auto, {', '.join(RUNGS)}")
+    module, cls = RUNGS[name]
+    rung: Rung = getattr(import_module(module), cls)()
+    return rung

@@ -1,0 +1,149 @@
+"""From what a person gives to what is written: encode, plan, drive, and say what came of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from chainsim import Device, Outcome, load_device
+from drivers import Encoding, WrittenWaveform, write_waveform
+from encoders import EncodingReport, GridShape, TextFrames, TextOptions, TextScene, encode_text
+from planner import FramePlan, Plan, plan_scene
+
+from .progress import progress
+from .report import TextReport
+from .source import text_source
+
+__all__ = ["render_text"]
+
+# Back-translation holds the whole text and its cells at once.
+MOST_CHECKED = 100_000
+
+
+def render_text(source: str, *, device: str, out: Path | None, options: TextOptions, encoding: Encoding) -> TextReport:
+    """Encode text, plan it on a device and, with `out`, write the waveform.
+
+    Nothing is written when a frame cannot be made as asked: the report then says what is lacking and what
+    the nearest pattern is.
+
+    Parameters
+    ----------
+    source : a file, ``-``, or the text itself. device : profile name or file. out : the .wav.
+
+    Raises
+    ------
+    EncodeError, ChainError, PlanError, DriverError, AppError
+        When something that was given cannot be used.
+    """
+    began = time.perf_counter()
+    profile = load_device(device)
+    text = text_source(source)
+    scene = encode_text(text, GridShape(profile.rows, profile.cols), options)
+    watch = _Watch(plan_scene(scene, profile), stop_at_failure=out is not None)
+    written: WrittenWaveform | None = None
+    with progress("rendering") as update:
+        try:
+            if out is None:
+                for frame in watch:
+                    update(frame.end_s)
+            else:
+                plan = replace(watch.plan, frames=watch)
+                written = write_waveform(plan, out, encoding=encoding, progress=update)
+        except _CannotBeMade:
+            pass
+    return replace(_report(profile, scene, watch, written), seconds=time.perf_counter() - began)
+
+
+class _CannotBeMade(Exception):
+    """A frame's outcome is not ok, so there is nothing to write."""
+
+
+@dataclass
+class _Watch:
+    """The plan's frames passed through, and what is to be said of them."""
+
+    plan: Plan
+    stop_at_failure: bool
+    outcomes: dict[str, int] = field(default_factory=dict)
+    duration_s: float = 0.0
+    ramp_s: float = 0.0
+    error: float = 0.0
+    volts: float = 0.0
+    failed: FramePlan | None = None
+    failed_number: int = 0
+
+    def __iter__(self) -> Iterator[FramePlan]:
+        for number, frame in enumerate(self.plan.frames, 1):
+            self.outcomes[frame.outcome] = self.outcomes.get(frame.outcome, 0) + (frame.frame is not None)
+            self.duration_s = frame.end_s
+            self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
+            self.error = max(self.error, *(state.error for state in frame.states))
+            self.volts = max(self.volts, *(state.margins.volts for state in frame.states))
+            if frame.outcome is not Outcome.OK and self.failed is None:
+                self.failed, self.failed_number = frame, number
+                if self.stop_at_failure:
+                    raise _CannotBeMade
+            yield frame
+
+
+def _report(device: Device, scene: TextScene, watch: _Watch, written: WrittenWaveform | None) -> TextReport:
+    frames = scene.text_frames
+    encoded = frames.report
+    differences, sentence = _back_check(frames)
+    peak = float(np.max(np.abs(written.peak_volts))) if written else watch.volts * device.amplifier.volts
+    return TextReport(
+        device=device.name,
+        tables=tuple(scene.encoding["tables"]),
+        text=frames.source.text[:200],
+        frames=encoded.frames,
+        pages=encoded.pages,
+        duration_s=watch.duration_s,
+        files=(str(written.samples_path), str(written.manifest_path)) if written else (),
+        peak_volts=peak,
+        limit_volts=device.amplifier.volts,
+        ramp_s=watch.ramp_s,
+        error=watch.error,
+        outcomes=watch.outcomes,
+        undefined=_undefined(encoded),
+        split=tuple(
+            f"{split.word!r} at character {split.span[0]}, page {split.page + 1}, "
+            + ("hyphenated" if split.hyphenated else "at the last cell")
+            for split in encoded.splits
+        ),
+        differences=differences,
+        notes=(sentence, *_notes(device, encoded, watch)),
+    )
+
+
+def _undefined(encoded: EncodingReport) -> tuple[str, ...]:
+    return tuple(
+        f"{use.characters} ({use.count} times, first at character {use.first}): {use.action}"
+        + (f" as {use.written!r}" if use.written else "")
+        for use in encoded.undefined
+    )
+
+
+def _back_check(frames: TextFrames) -> tuple[tuple[str, ...], str]:
+    """What does not come back when the cells are translated back, and a sentence on it."""
+    if len(frames.source.text) > MOST_CHECKED:
+        return (), f"A text of more than {MOST_CHECKED} characters is not translated back here; verify does it."
+    check = frames.check()
+    return tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences), check.sentence
+
+
+def _notes(device: Device, encoded: EncodingReport, watch: _Watch) -> Iterator[str]:
+    if encoded.split_total > len(encoded.splits):
+        yield f"{encoded.split_total} words were split; the first {len(encoded.splits)} are listed."
+    if watch.failed is None:
+        return
+    yield f"Frame {watch.failed_number}: {watch.failed.note}"
+    yield "The nearest pattern it can make, in percent of full scale, row by row:"
+    levels = np.array([np.abs(state.phasor + state.mean) for state in watch.failed.states]) / device.full_scale
+    for row in levels.reshape(device.rows, device.cols):
+        yield "  " + " ".join(f"{100 * level:3.0f}" for level in row)
+    if watch.stop_at_failure:
+        yield "Nothing was written."

@@ -1,0 +1,204 @@
+"""What a written waveform makes felt: the full equations integrated under the samples in the file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Device, GridIntegrator
+from drivers import FrameMark, Manifest, Role, read_waveform
+from encoders import back_check, covered_text, read_cells
+
+from .progress import progress
+from .report import DOT_THRESHOLD, FrameCheck, VerifyReport
+
+__all__ = ["verify"]
+
+Floats = NDArray[np.float64]
+
+# Forces, links and positions of a block stay near 8 MB each, whatever the grid.
+BLOCK_VALUES = 1 << 20
+
+
+class Felt(NamedTuple):
+    """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
+
+    `level` is what is compared with the target: the mean of a bias pattern, else the amplitude at the
+    drive's frequency. `still` and `moving` are both of them.
+    """
+
+    level: Floats
+    still: Floats
+    moving: Floats
+
+
+def verify(path: Path) -> VerifyReport:
+    """Integrate the device's full equations under the samples of `path` and say what is felt.
+
+    Reads the samples and the manifest beside them, nothing else.
+
+    Raises
+    ------
+    FileError, UnreadableWaveform
+        When the files cannot be used, or the samples are not those the manifest was written for.
+    """
+    began = time.perf_counter()
+    manifest, reader = read_waveform(path)
+    manifest.check_digest(reader.path)
+    integration = _Integration(manifest)
+    with progress("verifying") as update:
+        for block in reader.blocks(integration.block):
+            integration.advance(block)
+            update(integration.position, manifest.samples)
+    checks = [_check(mark, felt) for mark, felt in zip(manifest.frames, integration.felt(), strict=True)]
+    report = VerifyReport(
+        path=str(reader.path),
+        device=manifest.device.name,
+        frames=tuple(checks),
+        samples=manifest.samples,
+        rate_hz=manifest.rate_hz,
+        notes=tuple(integration.notes()),
+    )
+    if manifest.encoding.get("kind") in {"text", "braille"}:
+        report = _with_text(report, manifest)
+    return replace(report, seconds=time.perf_counter() - began)
+
+
+class _Integration:
+    """The grid under the samples, and what each frame collects of its motion while it stands."""
+
+    def __init__(self, manifest: Manifest) -> None:
+        device = manifest.device
+        self._manifest, self._device = manifest, device
+        self.block = max(256, BLOCK_VALUES // (device.rows * device.cols))
+        self._grid = GridIntegrator(
+            shape=(device.rows, device.cols),
+            chain_length=device.chain_length,
+            delta=device.delta,
+            beta=device.beta,
+            ring=device.coupling.closure is Closure.RING,
+            dtau=device.tau_per_s / manifest.rate_hz,
+        )
+        self._fits = [_Fit(device, mark, manifest.rate_hz) for mark in manifest.frames]
+        self._first = 0
+        self.position = 0
+
+    def advance(self, volts: Floats) -> None:
+        """Take the next block of samples, float64, shape (S, channels), volts."""
+        device, manifest = self._device, self._manifest
+        index = np.arange(self.position, self.position + len(volts))
+        force = np.zeros((len(volts), device.rows, device.cols))
+        for channel in manifest.channels:
+            per_volt = device.epsilon_per_volt if channel.role is Role.DRIVE else device.bias_per_volt
+            force[:, channel.row, channel.col or 0] += volts[:, channel.index] * per_volt
+        z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz))
+        for fit in self._fits[self._first :]:
+            if fit.first > index[-1]:
+                break
+            fit.take(index, z)
+        while self._first < len(self._fits) and self._fits[self._first].stop <= index[-1] + 1:
+            self._first += 1
+        self.position += len(volts)
+
+    def felt(self) -> Iterator[Felt]:
+        """What each frame makes felt."""
+        for fit in self._fits:
+            yield fit.felt()
+
+    def notes(self) -> Iterator[str]:
+        """What a person should know of the integration."""
+        gone = self._grid.escaped
+        if gone is not None:
+            yield (
+                f"The actuator in row {gone.row}, column {gone.col} left its softening well at "
+                f"{gone.sample / self._manifest.rate_hz:.3f} s; its chain counts as not felt from there on."
+            )
+
+
+class _Fit:
+    """Least squares of 1, cos and sin at each row's drive frequency over the samples of one frame."""
+
+    def __init__(self, device: Device, mark: FrameMark, rate_hz: int) -> None:
+        self._device, self._mark, self._rate_hz = device, mark, rate_hz
+        self.first = round(mark.settled_s * rate_hz)
+        self.stop = round(mark.end_s * rate_hz)
+        self._gram = np.zeros((device.rows, 3, 3))
+        self._load = np.zeros((device.rows, 3, device.cols))
+
+    def take(self, index: NDArray[np.intp], z: Floats) -> None:
+        """Collect the samples of a block that belong to the frame."""
+        inside = slice(*np.searchsorted(index, [self.first, self.stop]))
+        tau = index[inside] / self._rate_hz * self._device.tau_per_s
+        for row, omega in enumerate(self._mark.omega):
+            if row == 0 or omega != self._mark.omega[row - 1]:
+                basis = np.stack([np.ones_like(tau), np.cos(omega * tau), np.sin(omega * tau)])
+            self._gram[row] += basis @ basis.T
+            self._load[row] += basis @ z[inside, row]
+
+    def felt(self) -> Felt:
+        """Mean and amplitude; NaN where the frame has too few samples to tell."""
+        full, shape = self._device.full_scale, (self._device.rows, self._device.cols)
+        if self._gram[0, 0, 0] < 3:
+            nothing = np.full(shape, np.nan)
+            return Felt(nothing, nothing, nothing)
+        parts = np.stack([np.linalg.lstsq(g, v)[0] for g, v in zip(self._gram, self._load, strict=True)], axis=1)
+        still, moving = parts[0] / full, np.hypot(parts[1], parts[2]) / full
+        return Felt(still if self._device.bias == "actuator" else moving, still, moving)
+
+
+def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
+    wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
+    return FrameCheck(
+        page=mark.page,
+        start_s=mark.start_s,
+        settled_s=mark.settled_s,
+        end_s=mark.end_s,
+        outcome=str(mark.outcome),
+        target=mark.target,
+        felt=felt.level,
+        wrong_dots=int(np.count_nonzero((wanted != present) | np.isnan(felt.level))),
+        contrast_db=_contrast_db(wanted, felt.level),
+        amplitude_error=float(np.max(np.abs(felt.level - mark.target))),
+        wanted_cells=mark.cells,
+        text=mark.text,
+    )
+
+
+def _contrast_db(wanted: NDArray[np.bool_], level: Floats) -> float | None:
+    """Weakest wanted dot over strongest unwanted one; infinite over silence, None when the frame lacks either."""
+    if not wanted.any() or wanted.all():
+        return None
+    weakest, strongest = np.abs(level[wanted]).min(), np.abs(level[~wanted]).max()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(20 * np.log10(weakest / strongest))
+
+
+def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
+    """Read the felt dots of each page as cells, and translate them back."""
+    encoding = manifest.encoding
+    checks: list[FrameCheck] = []
+    pages: list[str] = []
+    for _, parts in groupby(report.frames, key=lambda check: check.page):
+        together = list(parts)
+        cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
+        pages.append(cells)
+        checks += [replace(check, felt_cells=cells) for check in together]
+    source = covered_text((mark.span, mark.text) for mark in manifest.frames)
+    check = back_check(pages, source, encoding)
+    return replace(
+        report,
+        frames=tuple(checks),
+        source_text=source,
+        felt_text=check.back,
+        text_equal=check.text_equal,
+        cells_equal=check.cells_equal,
+        differences=tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences),
+        notes=(*report.notes, check.sentence),
+    )

@@ -1,0 +1,165 @@
+"""Link strengths over time: the events a controller gets, and the lam they amount to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device
+from planner import ChainState, FramePlan, Ramp
+
+__all__ = ["CouplingEvent", "CouplingWriter", "LamTrack"]
+
+Floats = NDArray[np.float64]
+
+DIGITS = 12  # significant digits of lam in a file
+TIME_DECIMALS = 12  # a picosecond: drops the noise of adding start and node times
+
+
+@dataclass(frozen=True)
+class CouplingEvent:
+    """The links of one row start to move.
+
+    Attributes
+    ----------
+    t_s : when, seconds. row : which.
+    lam : cols - 1 numbers, ``lam[m - 1]`` couples actuator m-1 into m; 0 between chains.
+    ramp_s : seconds that the linear change from the present value to `lam` takes; 0 is a jump.
+    """
+
+    t_s: float
+    row: int
+    lam: tuple[float, ...]
+    ramp_s: float
+
+
+class CouplingWriter:
+    """Turns frames, in order, into the events that change something."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._current: list[tuple[float, ...] | None] = [None] * device.rows
+
+    def events(self, frame: FramePlan) -> list[CouplingEvent]:
+        """The events of the next frame by time, then row; none when the device has no coupling."""
+        if self._device.coupling.scope == "none":
+            return []
+        per_row = self._device.chains_per_row
+        events: list[CouplingEvent] = []
+        for row in range(self._device.rows):
+            chains = slice(row * per_row, (row + 1) * per_row)
+            path = _RowPath.of(self._device, frame.states[chains], frame.ramps[chains])
+            events.extend(self._row_events(row, frame.start_s, path))
+        return sorted(events, key=lambda event: (event.t_s, event.row))
+
+    def _row_events(self, row: int, start_s: float, path: _RowPath) -> Iterator[CouplingEvent]:
+        times = [round(start_s + t, TIME_DECIMALS) for t in path.t_s.tolist()]
+        jumps = np.any(path.before != path.after, axis=1)
+        yield from self._change(row, times[0], path.after[0], 0.0)
+        for k in range(1, len(times)):
+            ramp_s = round(times[k] - times[k - 1], TIME_DECIMALS)
+            yield from self._change(row, times[k - 1], path.before[k], ramp_s)
+            if jumps[k]:
+                yield from self._change(row, times[k], path.after[k], 0.0)
+
+    def _change(self, row: int, t_s: float, lam: Floats, ramp_s: float) -> Iterator[CouplingEvent]:
+        rounded = tuple(float(f"{value:.{DIGITS}g}") for value in lam.tolist())
+        if rounded != self._current[row]:
+            self._current[row] = rounded
+            yield CouplingEvent(t_s, row, rounded, ramp_s)
+
+
+@dataclass(frozen=True)
+class _RowPath:
+    """A row's links in one frame: linear between the times, with a jump at a time where before != after.
+
+    t_s : float64, shape (K,), from the frame's start. before, after : float64, shape (K, cols-1).
+    """
+
+    t_s: Floats
+    before: Floats
+    after: Floats
+
+    @classmethod
+    def of(cls, device: Device, states: Sequence[ChainState], ramps: Sequence[Ramp | None]) -> _RowPath:
+        nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
+        t_s = np.unique(np.concatenate([np.zeros(1), *nodes]))
+        before = np.zeros((len(t_s), device.cols - 1))
+        after = np.zeros_like(before)
+        n = device.chain_length
+        for chain, (state, ramp) in enumerate(zip(states, ramps, strict=True)):
+            links = slice(chain * n, chain * n + n - 1)
+            before[:, links] = after[:, links] = state.lam
+            if ramp is not None and ramp.lam is not None and ramp.lam_t_s is not None:
+                for link in range(n - 1):
+                    moving = np.interp(t_s, ramp.lam_t_s, ramp.lam[:, link])
+                    column, last = chain * n + link, ramp.lam_t_s[-1]
+                    before[:, column] = np.where(t_s <= last, moving, state.lam[link])
+                    after[:, column] = np.where(t_s < last, moving, state.lam[link])
+        return cls(t_s, before, after)
+
+
+class LamTrack:
+    """lam of every link at any time, from the events of a manifest.
+
+    Parameters
+    ----------
+    events : by time within each row. rows, cols : the grid.
+    """
+
+    def __init__(self, events: Iterable[CouplingEvent], rows: int, cols: int) -> None:
+        of_row: list[list[CouplingEvent]] = [[] for _ in range(rows)]
+        for event in events:
+            of_row[event.row].append(event)
+        self._rows = [_RowTrack.of(row, cols) for row in of_row]
+        self._cols = cols
+
+    def at(self, times_s: Floats) -> Floats:
+        """Links at the given times.
+
+        Parameters
+        ----------
+        times_s : float64, shape (S,), seconds.
+
+        Returns
+        -------
+        float64, shape (S, rows, cols); ``[:, r, m]`` couples actuator m-1 of row r into m, and column 0 is 0.
+        """
+        lam = np.zeros((len(times_s), len(self._rows), self._cols))
+        for row, track in enumerate(self._rows):
+            lam[:, row, 1:] = track.at(times_s)
+        return lam
+
+
+@dataclass(frozen=True)
+class _RowTrack:
+    """Segments of one row: from `before` at start_s linearly to `after` at start_s + ramp_s, then constant."""
+
+    start_s: Floats
+    ramp_s: Floats
+    before: Floats
+    after: Floats
+
+    @classmethod
+    def of(cls, events: Sequence[CouplingEvent], cols: int) -> _RowTrack:
+        after = np.zeros((len(events) + 1, cols - 1))
+        after[1:] = [event.lam for event in events] or np.zeros((0, cols - 1))
+        before = np.zeros_like(after)
+        # Until the first event every link is 0.
+        start_s = np.array([-np.inf, *(event.t_s for event in events)])
+        ramp_s = np.array([0.0, *(event.ramp_s for event in events)])
+        for k in range(1, len(after)):
+            done = min(1.0, (start_s[k] - start_s[k - 1]) / ramp_s[k - 1]) if ramp_s[k - 1] > 0 else 1.0
+            before[k] = (1 - done) * before[k - 1] + done * after[k - 1]
+        return cls(start_s, ramp_s, before, after)
+
+    def at(self, times_s: Floats) -> Floats:
+        k = np.searchsorted(self.start_s, times_s, side="right") - 1
+        ramp_s = self.ramp_s[k]
+        jump = ramp_s == 0
+        done = np.where(jump, 1.0, np.minimum(1.0, (times_s - self.start_s[k]) / np.where(jump, 1.0, ramp_s)))
+        mixed: Floats = (1 - done)[:, np.newaxis] * self.before[k] + done[:, np.newaxis] * self.after[k]
+        return mixed

@@ -1,0 +1,64 @@
+"""Which characters a table can write, asked once for each character."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from . import louis_binding
+from .dots import BLANK, HIGHEST_6_DOT
+
+__all__ = ["Alphabet", "alphabet"]
+
+_BRACKETS = (("(", ")"), ("[", "]"), ("{", "}"), ("<", ">"), ("\u201c", "\u201d"), ('"', '"'))
+
+
+class Alphabet:
+    """The characters one list of tables can write; grows as it is asked. Use `alphabet` to get one.
+
+    A character is written when its cells have a dot, or when the table knows it and writes nothing for it
+    (an Arabic tatweel). It is not when the library falls back to ``'\\x..'`` cells, or to a blank.
+    """
+
+    def __init__(self, tables: tuple[str, ...]) -> None:
+        self.tables = tables
+        self._written: dict[str, bool] = {}
+        self._good = {" "}
+
+    def lacks(self, characters: str) -> bool:
+        """Whether one of `characters` cannot be written."""
+        return not self._good.issuperset(characters) and any(not self.writes(char) for char in set(characters))
+
+    def writes(self, char: str) -> bool:
+        """Whether this one character can be written."""
+        known = self._written.get(char)
+        if known is None:
+            known = self._written[char] = self._ask(char)
+            if known:
+                self._good.add(char)
+        return known
+
+    def _ask(self, char: str) -> bool:
+        if char.isspace() or "\u2800" <= char <= "\u28ff":
+            return True
+        sure = louis_binding.translate_string(self.tables, char, undefined=False)
+        if sure.strip(BLANK):
+            return True
+        return not sure and not louis_binding.translate_string(self.tables, char, undefined=True)
+
+    def dots(self, char: str) -> int:
+        """8 when the sign of this character uses dot 7 or 8, else 6."""
+        cells = louis_binding.translate_string(self.tables, char, undefined=False)
+        return 8 if max(cells, default="") > HIGHEST_6_DOT else 6
+
+    def brackets(self) -> tuple[str, str]:
+        """A pair of signs to put around a name, the first the table can write in six dots; else blanks."""
+        for opening, closing in _BRACKETS:
+            if not self.lacks(opening + closing) and self.dots(opening) == self.dots(closing) == 6:
+                return opening, closing
+        return " ", " "
+
+
+@cache
+def alphabet(tables: tuple[str, ...]) -> Alphabet:
+    """The alphabet of `tables`, one for the whole process."""
+    return Alphabet(tables)

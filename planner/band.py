@@ -1,0 +1,104 @@
+"""At which frequency, and how fast, a device's vibrating chains can change patterns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device
+
+from .envelopes import change, rise
+from .links import drive_for, links_for
+
+__all__ = ["LOWER", "NODES_PER_RAMP", "Band", "choose_band"]
+
+Floats = NDArray[np.float64]
+
+LONGEST_RAMP_S = 0.35
+CANDIDATES = 41
+NODES_PER_RAMP = 251
+# Half of the volts stay free for what a closed form does not know.
+STEADY_SHARE = 0.5
+# The lower of the two levels an unraised dot may take, in units of the floor.
+LOWER = 0.5
+
+
+@dataclass(frozen=True)
+class Band:
+    """What is common to all patterns of a device: drive frequency, ramp length, highest level of an unraised dot.
+
+    `lacking` is empty, or one clause that says what the device lacks for patterns with this contrast.
+    """
+
+    omega: float
+    ramp_s: float
+    floor: float
+    lacking: str = ""
+
+
+def choose_band(device: Device, contrast_db: float) -> Band:
+    """The highest drive frequency at which every change between on/off patterns can be made.
+
+    Detuning buys short ramps and robustness against spread, and costs volts and reach of the links; so the
+    highest frequency the device can pay for. A single actuator is driven likewise, and has no floor.
+    """
+    floor = 0.0 if device.chain_length == 1 else 10.0 ** (-contrast_db / 20)
+    lacking = ""
+    for omega in np.linspace(device.omega.max, device.omega.min, CANDIDATES):
+        ramp_s = _ramp_s(device, float(omega))
+        found = _lack(device, float(omega), ramp_s, floor)
+        if not found:
+            return Band(float(omega), ramp_s, floor)
+        lacking = lacking or found
+    return Band(device.omega.max, LONGEST_RAMP_S, floor, lacking)
+
+
+def _ramp_s(device: Device, omega: float) -> float:
+    """Length of a ramp with enough beats between drive and stage resonance to leave no residue.
+
+    The smooth blends have little content beyond 2 + 0.9 n beats per ramp, measured under the full equations
+    for n = 1 and 6; what content they have there, every further stage magnifies.
+    """
+    alike = np.full(device.chain_length, device.full_scale)
+    links = links_for(device.chain, alike, omega)
+    resonance = math.sqrt(1.0 + float(links[0])) if device.chain_length > 1 and np.isfinite(links[0]) else 1.0
+    beat_hz = abs(omega - resonance) * device.f0_hz
+    beats = 2.0 + 0.9 * device.chain_length
+    shortest = beats / beat_hz if beat_hz else math.inf
+    return min(shortest, LONGEST_RAMP_S) if device.chain_length == 1 else shortest
+
+
+def _probes(device: Device, floor: float) -> Floats:
+    """On/off profiles with every kind of step: all, none, alternating, blocks."""
+    m = np.arange(device.chain_length)
+    shapes = np.array([m >= 0, m < 0, m % 2 == 0, m % 2 == 1, m // 2 % 2 == 0, m // 2 % 2 == 1])
+    unraised = floor * np.where(m % 2 == 0, 1.0, LOWER)
+    return np.asarray(np.where(shapes, 1.0, unraised) * device.full_scale)
+
+
+def _lack(device: Device, omega: float, ramp_s: float, floor: float) -> str:
+    """What the device lacks at `omega`, or ""."""
+    if ramp_s > LONGEST_RAMP_S:
+        return f"frame changes of {ramp_s:.2g} s are too slow; it lacks detuning (a higher omega.max)"
+    probes = _probes(device, floor)
+    chain, allowed = device.chain, device.coupling.lam
+    links = links_for(chain, probes, omega)
+    if not np.all(np.isfinite(links)):
+        return "no link can make a step of that contrast; it lacks detuning (a higher omega.max)"
+    if drive_for(chain, probes[:, 0], omega).max() > STEADY_SHARE * device.epsilon_max:
+        return "the steady drive needs more than half of the amplifier's volts; it lacks volts"
+    duration = ramp_s * device.tau_per_s
+    first, second = np.nonzero(~np.eye(len(probes), dtype=bool))
+    changes = change(chain, probes[first], probes[second], omega, duration, NODES_PER_RAMP // 4)
+    rises = rise(chain, probes[[0, 2, 3]], omega, duration, NODES_PER_RAMP // 4)
+    if not (changes.possible.all() and rises.possible.all()):
+        return "its links cannot follow a frame change; it lacks detuning (a higher omega.max)"
+    lam = changes.lam
+    if lam.size and (lam.min() < allowed.min or lam.max() > allowed.max):
+        return f"its links must reach {lam.min():.3g}..{lam.max():.3g}; it lacks range of lam"
+    if max(np.abs(changes.epsilon).max(), np.abs(rises.epsilon).max()) > device.epsilon_max:
+        return "the way in needs more than the amplifier's volts; it lacks volts"
+    return ""

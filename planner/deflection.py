@@ -1,0 +1,114 @@
+"""Patterns held still by a DC bias on every actuator (the paper's goal 1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Outcome, Setting, solve
+
+from . import jets
+from .plan import ChainState, Margins, Ramp
+from .strategy import Strategy
+
+__all__ = ["Deflection"]
+
+Floats = NDArray[np.float64]
+
+# A blend of eight resonance periods, smooth to the fifth derivative, has next to no content at the resonance:
+# the bias that follows it exactly hardly differs from the static one, and an actuator whose f0 is a few per
+# cent off does not ring.
+RAMP_PERIODS = 8
+SMOOTHNESS = 5
+NODES = 65
+TOL = 1e-12
+
+
+class Deflection(Strategy):
+    """b_m = z_m + beta z_m^3 - lam (z_{m-1} - z_m) for any wanted deflection, with the smallest lam there is."""
+
+    @property
+    def ramp_s(self) -> float:
+        """Length of every ramp in seconds."""
+        return RAMP_PERIODS / self.device.f0_hz
+
+    def held(self, target: Floats, started: bool) -> Floats:
+        """Just what is wanted: a still actuator costs nothing."""
+        return target
+
+    def _bias(self, z: Floats, force: Floats) -> Floats:
+        """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
+        device = self.device
+        lam = device.coupling.lam.min
+        before = np.roll(z, 1, axis=-1)
+        links = np.full(z.shape[-1], lam)
+        if device.coupling.closure is Closure.OPEN:
+            links[0] = 0.0
+        return np.asarray(force + z + device.beta * z**3 - links * (before - z))
+
+    def states(self, targets: Floats) -> list[ChainState]:
+        """Static settings for `targets`, checked by the static solver."""
+        device = self.device
+        biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
+        lam = np.full(device.chain_length - 1, device.coupling.lam.min)
+        setting = Setting.of(device.chain, epsilon=0.0, lam=device.coupling.lam.min, omega=1.0, bias=biases)
+        rung = "static" if device.coupling.closure is Closure.OPEN else "auto"
+        response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
+        error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
+        return [
+            ChainState(
+                target=targets[i],
+                epsilon=0j,
+                lam=lam,
+                bias=biases[i],
+                omega=1.0,
+                phasor=np.zeros(device.chain_length, dtype=np.complex128),
+                mean=response.mean[i],
+                error=float(error[i]),
+                margins=self._margins(biases[i]),
+                outcome=self._outcome(response.outcome[i], targets[i], biases[i]),
+            )
+            for i in range(len(targets))
+        ]
+
+    def _margins(self, bias: Floats) -> Margins:
+        largest = float(np.abs(bias).max())
+        beta = self.device.beta
+        fold = 2 / (3 * math.sqrt(3 * -beta)) if beta < 0 else math.inf
+        return Margins(volts=largest / self.device.bias_max, well=largest / fold)
+
+    def _outcome(self, solved: Outcome, target: Floats, bias: Floats) -> Outcome:
+        device, margins = self.device, self._margins(bias)
+        # Past the fold the bias that balances a deflection falls again, but nothing stable stands there.
+        stiffness = 1.0 + device.coupling.lam.min + 3 * device.beta * (target * device.full_scale) ** 2
+        if solved is Outcome.OK and (max(margins.volts, margins.well) > 1 or np.any(stiffness <= 0)):
+            return Outcome.UNREACHABLE
+        return solved
+
+    def note(self) -> str:
+        """What is lacking when a deflection cannot be held."""
+        return (
+            f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well; "
+            "lower full_scale in the profile."
+        )
+
+    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+        """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
+        duration = self.ramp_s * self.device.tau_per_s
+        blend = jets.smoothstep(SMOOTHNESS, NODES, 4)
+        x = np.linspace(0.0, self.ramp_s, NODES)
+        out: list[Ramp | None] = []
+        for one, other in zip(before, after, strict=True):
+            step = (other.target - one.target) * self.device.full_scale
+            if not np.any(step):
+                out.append(None)
+                continue
+            z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))
+            z = z + one.target * self.device.full_scale
+            bias = self._bias(z, push + self.device.delta * speed)
+            linear = self._bias(speed, jerk + self.device.delta * push)
+            slope = linear + self.device.beta * (3 * z**2 * speed - speed**3)
+            out.append(Ramp(t_s=x, bias=bias, bias_slope=slope * self.device.tau_per_s))
+        return out

@@ -1,0 +1,23 @@
+"""Errors of the planner, each with the situations in which it is met."""
+
+from __future__ import annotations
+
+__all__ = ["DwellTooShort", "PlanError", "SceneDoesNotFit"]
+
+
+class PlanError(Exception):
+    """Root of everything `planner` raises on purpose."""
+
+
+class SceneDoesNotFit(PlanError, ValueError):
+    """The scene was laid out for another grid than the device has.
+
+    Example: a scene of 6 x 6 planned on a device of 40 x 96.
+    """
+
+
+class DwellTooShort(PlanError, ValueError):
+    """A frame is over before its pattern could stand.
+
+    Example: ``--dwell 0.2`` on a device whose frame changes take 0.34 s.
+    """

@@ -1,0 +1,124 @@
+"""Words on pages: nothing lost, nothing doubled, and the dots alone say where words end."""
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from encoders import GridShape, LayoutError, join_pages
+from encoders.layout import NARROW, Layout, PlacedWord, paginate
+
+# Blank-free cells with many hyphens, the one cell that is special.
+WORD = st.text(st.sampled_from("⠁⠃⠤"), min_size=1, max_size=30)
+
+
+def words_of(cells: list[str], glued: set[int] = frozenset()) -> list[PlacedWord]:
+    placed, at = [], 0
+    for index, word in enumerate(cells):
+        joined = index in glued and index > 0
+        if index and not joined:
+            at += 1
+        placed.append(PlacedWord(word, at, at + len(word), range(at, at + len(word)), 0, 0, joined))
+        at += len(word)
+    return [*placed, PlacedWord("", at, at, (), 0, 0, False)]
+
+
+def every_other(word: PlacedWord) -> list[int]:
+    return list(range(2, len(word.cells), 2))
+
+
+def lined(page: str, layout: Layout) -> str:
+    width = layout.cells_per_line
+    return "\n".join(page[at : at + width] for at in range(0, len(page), width))
+
+
+@given(
+    st.lists(WORD, min_size=1, max_size=20), st.sets(st.integers(1, 19)), st.integers(1, 3), st.integers(1, 12),
+    st.booleans(),
+)  # fmt: skip
+@example(["⠁⠁⠁⠁⠁⠤", "⠁"], {1}, 2, 3, True)
+@example(["⠤" * 30, "⠤⠤", "⠁"], {1}, 2, 3, True)
+@example(["⠁⠁⠁⠁⠁⠤", "⠁⠁⠁⠁⠁⠁", "⠁⠁⠁⠁⠁⠁"], set(), 2, 3, True)
+@settings(max_examples=400)
+def test_pages_join_to_the_words_again(words, glued, lines, width, hyphenating):
+    layout = Layout(GridShape(3 * lines, 2 * width), 3, hyphen="⠤" if hyphenating and lines * width >= 4 else "")
+    if layout.hyphen and layout.run < 4:
+        return
+    placed = words_of(words, glued)
+    pages = list(paginate(placed, layout, every_other, lambda *_: None))
+    expected = "".join(("" if word.glued else "⠀") + word.cells for word in placed).strip("⠀")
+    encoding = {"run": layout.run, "hyphen": layout.hyphen}
+    assert join_pages((lined(page.cells, layout) for page in pages), encoding) == expected
+    assert all(len(page.cells) == layout.capacity for page in pages)
+    assert [page.end_of_paragraph for page in pages] == [False] * (len(pages) - 1) + [True]
+
+
+@given(st.lists(WORD, min_size=1, max_size=20), st.integers(1, 3), st.integers(1, 12))
+def test_every_cell_is_shown_once_in_order_and_spans_cover_the_source(words, lines, width):
+    layout = Layout(GridShape(3 * lines, 2 * width), 3)
+    placed = words_of(words)
+    pages = list(paginate(placed, layout, every_other, lambda *_: None))
+    assert "".join(page.cells for page in pages).replace("⠀", "") == "".join(words)
+    covered = [at for page in pages for at in range(page.start, page.end)]
+    source = {at for word in placed for at in range(word.start, word.end)}
+    assert source <= set(covered)
+    assert covered == sorted(set(covered)), "no position is shown on two pages"
+
+
+@given(st.lists(WORD, min_size=1, max_size=20), st.integers(1, 3), st.integers(1, 12))
+def test_only_words_longer_than_a_run_are_split(words, lines, width):
+    layout = Layout(GridShape(3 * lines, 2 * width), 3)
+    split: list[str] = []
+    list(paginate(words_of(words), layout, every_other, lambda word, *_: split.append(word.cells)))
+    assert {word for word in words if len(word) > layout.run} == {word for word in split if len(word) > layout.run}
+    # A word that fills all but one cell of a run may meet the blank owed to the word before it.
+    assert all(len(word) >= layout.run - 1 for word in split)
+
+
+def test_a_word_that_ends_in_the_last_cell_owes_a_blank_only_without_hyphens():
+    for hyphen, then in (("", "⠀⠸⠺⠀⠀⠀"), ("⠤", "⠸⠺⠀⠀⠀⠀")):
+        layout = Layout(GridShape(6, 6), 3, hyphen=hyphen)
+        pages = paginate(words_of(["⠠⠓⠑⠇⠇⠕", "⠸⠺"]), layout, every_other, lambda *_: None)
+        assert [page.cells for page in pages] == ["⠠⠓⠑⠇⠇⠕", then]
+
+
+def test_a_word_keeps_to_its_line_when_it_fits_one():
+    layout = Layout(GridShape(6, 6), 3)
+    pages = [page.cells for page in paginate(words_of(["⠁⠁", "⠃⠃", "⠉⠉⠉⠉"]), layout, every_other, lambda *_: None)]
+    assert pages == ["⠁⠁⠀⠃⠃⠀", "⠉⠉⠉⠉⠀⠀"]
+
+
+def test_a_long_word_is_hyphenated_at_the_last_syllable_that_fits():
+    layout = Layout(GridShape(6, 6), 3, hyphen="⠤")
+    notes: list[tuple[int, bool]] = []
+    pages = paginate(words_of(["⠁⠃" * 4]), layout, every_other, lambda _, cut, hyphen: notes.append((cut, hyphen)))
+    assert [page.cells for page in pages] == ["⠁⠃⠁⠃⠤⠀", "⠁⠃⠁⠃⠀⠀"]
+    assert notes == [(4, True)]
+
+
+def test_without_syllables_it_is_split_at_the_last_cell():
+    for hyphen, wanted in (("⠤", ["⠁⠃⠁⠃⠁⠤", "⠃⠁⠃⠀⠀⠀"]), ("", ["⠁⠃⠁⠃⠁⠃", "⠁⠃⠀⠀⠀⠀"])):
+        layout = Layout(GridShape(6, 6), 3, hyphen=hyphen)
+        pages = paginate(words_of(["⠁⠃" * 4]), layout, lambda _: [], lambda *_: None)
+        assert [page.cells for page in pages] == wanted
+
+
+def test_wide_grids_are_filled_line_by_line():
+    layout = Layout(GridShape(6, 2 * NARROW), 3)
+    pages = paginate(words_of(["⠁" * 5, "⠃" * 5, "⠉" * 2]), layout, every_other, lambda *_: None)
+    assert [lined(page.cells, layout) for page in pages] == ["⠁⠁⠁⠁⠁⠀⠀⠀\n⠃⠃⠃⠃⠃⠀⠉⠉"]
+
+
+def test_cells_on_grids():
+    assert (Layout(GridShape(6, 6), 3).lines, Layout(GridShape(6, 6), 3).cells_per_line) == (2, 3)
+    spaced = Layout(GridShape(6, 6), 3, cell_gap=2, line_gap=1)
+    assert (spaced.lines, spaced.cells_per_line) == (1, 2)
+    large = Layout(GridShape(40, 96), 3)
+    assert (large.lines, large.cells_per_line, large.run) == (13, 48, 48)
+
+
+@pytest.mark.parametrize(
+    ("rows", "cols", "gap", "says"), [(2, 6, 0, "no room"), (6, 1, 0, "no room"), (6, 6, -1, "cell-gap")]
+)
+def test_impossible_layouts_are_refused(rows, cols, gap, says):
+    with pytest.raises(LayoutError, match=says):
+        Layout(GridShape(rows, cols), 3, cell_gap=gap)

@@ -1,0 +1,99 @@
+"""Finding liblouis, its tables, and saying what is missing."""
+
+import subprocess
+import sys
+import types
+
+import pytest
+
+from encoders import LouisMissing, TableMissing, list_tables, louis_binding, resolve_tables
+from encoders.tables import hyphenation_tables, table_dots
+
+
+def test_tables_carry_metadata():
+    tables = {info.file: info for info in list_tables()}
+    assert len(tables) > 100
+    ueb = tables["en-ueb-g2.ctb"]
+    assert (ueb.language, ueb.grade, ueb.contraction) == ("en", "2", "full")
+    assert "English" in ueb.name
+    assert tables["de-g2.ctb"].direction == "forward"
+
+
+@pytest.mark.parametrize(
+    ("spec", "tables"),
+    [
+        ("en-ueb-g1.ctb", ("en-ueb-g1.ctb",)),
+        (" en-ueb-g2.ctb , hyph_en_US.dic ", ("en-ueb-g2.ctb", "hyph_en_US.dic")),
+        ("language:de grade:2", ("de-g2.ctb",)),
+        ("language:pl", ("pl.tbl",)),
+        ("language:hi", ("hi.tbl",)),
+    ],
+)
+def test_specs(spec, tables):
+    assert resolve_tables(spec) == tables
+
+
+@pytest.mark.parametrize(
+    ("spec", "says"),
+    [
+        ("en-ueb-g3.ctb", "'en-ueb-g3.ctb': no such table; nearest: en-ueb-g2.ctb"),
+        ("EN-UEB-G22.CTB", "nearest: en-ueb-g2.ctb"),
+        ("norwegian", "nearest: no-no"),
+        ("en-ueb-g2.ctb,none.dic", "'none.dic'"),
+        ("language:de grade:9", "for language de there are: de-"),
+        ("language:xx", "none answers the query"),
+        ("", "empty"),
+        (",", "no such table|does not compile"),
+    ],
+)
+def test_a_wrong_table_is_one_line_with_the_nearest(spec, says):
+    with pytest.raises(TableMissing, match=says) as caught:
+        resolve_tables(spec)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_table_that_does_not_compile_says_why(tmp_path, capfd):
+    path = tmp_path / "broken.utb"
+    path.write_text("nonsense a b\n")
+    with pytest.raises(TableMissing, match=r"does not compile.*nonsense"):
+        resolve_tables(str(path))
+    assert capfd.readouterr() == ("", ""), "the library itself prints nothing"
+
+
+def test_dots_of_tables():
+    assert table_dots(("el.ctb",)) == 6
+    assert table_dots(("pl-pl-comp8.ctb",)) == 8
+    assert table_dots(("es-g1.ctb",)) == 0
+
+
+def test_hyphenation_dictionaries_are_found_by_language():
+    assert hyphenation_tables(("de-g2.ctb",)) == ("de-g2.ctb", "hyph_de_DE.dic")
+    assert hyphenation_tables(("ar-ar-g1.utb",)) == ()
+    assert louis_binding.hyphenate(("en-ueb-g2.ctb", "hyph_en_US.dic"), "knowledgeable") == [5, 9]
+
+
+def test_a_noisy_table_prints_nothing(capfd):
+    louis_binding.translate(("ko-g2.ctb",), "한국어")
+    louis_binding.best_table("language:zz")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_false_louis_is_passed_over(monkeypatch):
+    monkeypatch.setitem(sys.modules, "louis", types.ModuleType("louis"))
+    assert louis_binding._imported() is None
+
+
+def test_without_liblouis_the_cure_is_named(monkeypatch):
+    monkeypatch.setattr(louis_binding, "_imported", lambda: None)
+    monkeypatch.setattr(louis_binding, "_from_distribution", lambda: None)
+    with pytest.raises(LouisMissing, match="apt-get install python3-louis"):
+        louis_binding._louis.__wrapped__()
+
+
+def test_importing_encoders_is_light():
+    code = (
+        "import sys, encoders; print(sorted(m for m in "
+        "('louis', 'numba', 'scipy', 'matplotlib', 'PIL', 'dask', 'pydantic') if m in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
