@@ -89,7 +89,7 @@ class TextReport:
         yield f"Tables: {', '.join(self.tables)}."
         yield f"Peak: {self.peak_volts:.1f} V of {self.limit_volts:g} V."
         yield f"Longest ramp: {self.ramp_s:.3f} s."
-        yield f"Predicted worst error: {100 * self.error:.2f} % of full scale."
+        yield f"Predicted error of the settled patterns: {100 * self.error:.2f} % of full scale."
         if not self.ok:
             counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
             yield f"Not every frame can be made as asked: {counts}."

@@ -86,7 +86,8 @@ class _RowPath:
     @classmethod
     def of(cls, device: Device, states: Sequence[ChainState], ramps: Sequence[Ramp | None]) -> _RowPath:
         nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
-        t_s = np.unique(np.concatenate([np.zeros(1), *nodes]))
+        # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
+        t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))
         before = np.zeros((len(t_s), device.cols - 1))
         after = np.zeros_like(before)
         n = device.chain_length

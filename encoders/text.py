@@ -26,6 +26,8 @@ from .undefined import Undefined, writable
 __all__ = ["TextFrames", "TextOptions", "TextScene", "encode_text"]
 
 DEFAULT_RATE = 6.0
+SHORT_PAGE_S = 1.0
+"""A page with few cells lasts as long as it would with more, up to this."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class TextOptions:
     table : translation table: a file name, a comma list, or a query such as ``language:de grade:2``.
     undefined : what becomes of characters the table cannot write.
     cell_gap, line_gap : actuators left free between cells and between lines.
-    rate : cells per second; a page lasts (cells it has room for) / rate. None means 6 (1 s for 3 x 2 cells).
+    rate : cells per second; a page lasts (cells up to its last one) / rate, but at least 1 s or, where that is
+        less, (cells it has room for) / rate. None means 6: 1 s for 3 x 2 cells.
     dwell_s : seconds a page lasts, instead of `rate`. Shown in parts, a page gives each part an equal share,
         but at least 0.6 s; it then lasts longer.
     presentation : dots together, by row, or by dot.
@@ -175,7 +178,9 @@ class TextFrames:
         self._encoding = encoding
         self._log = ReportLog()
         self._show = presenter(layout, options.presentation)
-        self._dwell_s = options.dwell_s or layout.capacity / (options.rate or DEFAULT_RATE)
+        rate = options.rate or DEFAULT_RATE
+        self._s_per_cell = 0.0 if options.dwell_s else 1 / rate
+        self._shortest_s = options.dwell_s or min(SHORT_PAGE_S, layout.capacity / rate)
 
     @property
     def report(self) -> EncodingReport:
@@ -184,12 +189,13 @@ class TextFrames:
 
     def __iter__(self) -> Iterator[Frame]:
         self._log = log = ReportLog()
-        text, show, dwell_s = self.source.text, self._show, self._dwell_s
+        text, show = self.source.text, self._show
         between = False
         for page in paginate(self._words(log), self.layout, self._breaks, self._note):
             if between:
                 yield self._blank_frame(log, page.start)
             shown = show(page.cells)
+            dwell_s = max(self._shortest_s, len(page.cells.rstrip(BLANK)) * self._s_per_cell)
             share_s = dwell_s if len(shown.parts) == 1 else max(dwell_s / len(shown.parts), MIN_PART_S)
             # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
             gap = PARAGRAPH_END.match(text, page.end) if page.end_of_paragraph else None
@@ -204,7 +210,7 @@ class TextFrames:
     def _blank_frame(self, log: ReportLog, position: int) -> Frame:
         amplitude = np.zeros((self.layout.shape.rows, self.layout.shape.cols), dtype=np.complex128)
         amplitude.flags.writeable = False
-        frame = Frame(TargetPattern(amplitude), self._dwell_s, log.pages, "", (position, position), "")
+        frame = Frame(TargetPattern(amplitude), self._shortest_s, log.pages, "", (position, position), "")
         log.pages += 1
         log.frames += 1
         return frame

@@ -70,7 +70,7 @@ class PlanCache:
             self._give_up(error)
 
     def _give_up(self, error: Exception) -> None:
-        log.warning("plan cache %s is not used: %s", cache_path(), error)
+        log.warning("plan cache %s is not used: %s; delete it, or let DOTWAVE_CACHE name a folder", cache_path(), error)
         if self._connection is not None:
             self._connection.close()
         self._connection = None
@@ -89,7 +89,7 @@ class PlanCache:
                     for item in items
                 ]
             return [None if row is None else _unpacked(row[0]) for row in rows]
-        except (sqlite3.Error, ValueError, KeyError, EOFError) as error:
+        except (sqlite3.Error, ValueError, LookupError, TypeError, AttributeError, EOFError) as error:
             self._give_up(error)
             return [None] * len(items)
 

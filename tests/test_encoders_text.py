@@ -127,11 +127,14 @@ def test_parts_share_a_page_and_superpose_to_it(presentation):
 
 
 def test_dwell_and_rate():
-    assert frames_of("a", rate=3.0)[0].dwell_s == 2.0
+    assert frames_of("zebras", rate=3.0, table="en-ueb-g1.ctb")[0].dwell_s == pytest.approx(2.0)
+    # A page with little on it is over sooner, but not in a flash.
+    assert frames_of("a", rate=3.0)[0].dwell_s == 1.0
+    assert frames_of("a", rate=12.0)[0].dwell_s == 0.5
     assert frames_of("a", rate=3.0, dwell_s=1.5)[0].dwell_s == 1.5
     parts = frames_of("Hello", dwell_s=12.0, presentation=Presentation.BY_ROW)
     assert sum(part.dwell_s for part in parts) == pytest.approx(12.0)
-    assert frames_of("a", shape=GridShape(6, 12))[0].dwell_s == 2.0
+    assert frames_of("hello you", shape=GridShape(6, 12), table="en-ueb-g1.ctb")[0].dwell_s == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])

@@ -1,0 +1,253 @@
+"""Patterns held by vibration: every on/off row, the ways between them, and what devices cannot do."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
+
+from chainsim import Device, Outcome, Span, load_device
+from planner import ChainState, Ramp
+from planner.strategy import strategy_for
+from planner.vibration import Vibration
+
+LINKED = load_device("linked-6x6")
+SINGLE = load_device("independent-6x6")
+ROWS = np.array(list(product((0.0, 1.0), repeat=6)))
+Floats = NDArray[np.float64]
+
+
+def vibration(device: Device = LINKED, contrast_db: float = 20.0) -> Vibration:
+    strategy = strategy_for(device, contrast_db)
+    assert isinstance(strategy, Vibration)
+    return strategy
+
+
+def standing(strategy: Vibration) -> list[ChainState]:
+    """All 64 rows as a chain holds them that has moved before."""
+    return strategy.states(np.array([strategy.held(row, True) for row in ROWS]))
+
+
+@pytest.fixture(scope="module")
+def strategy() -> Vibration:
+    return vibration()
+
+
+@pytest.fixture(scope="module")
+def states(strategy: Vibration) -> list[ChainState]:
+    return standing(strategy)
+
+
+def test_all_rows_are_held(states: list[ChainState]) -> None:
+    for row, state in zip(ROWS, states, strict=True):
+        assert state.outcome is Outcome.OK
+        assert state.error < 1e-7
+        felt = np.abs(state.phasor) / LINKED.full_scale
+        np.testing.assert_allclose(felt, state.target, atol=1e-7)
+        np.testing.assert_array_equal(state.target[row == 1], 1.0)
+        assert np.all(state.lam >= LINKED.coupling.lam.min)
+        assert np.all(state.lam <= LINKED.coupling.lam.max)
+        assert not state.bias.any()
+        assert LINKED.omega.min <= state.omega <= LINKED.omega.max
+
+
+def test_margins_are_sane(states: list[ChainState]) -> None:
+    for state in states:
+        assert state.margins.volts == pytest.approx(abs(state.epsilon) / LINKED.epsilon_max)
+        assert 0 < state.margins.volts < 0.51
+        assert state.margins.well == pytest.approx(LINKED.full_scale * state.target.max(), rel=1e-6)
+        assert 1 < state.margins.noise_gain < 1e12
+
+
+@pytest.mark.parametrize("contrast_db", [10.0, 20.0, 26.0])
+def test_contrast_is_honoured_or_what_is_lacking_is_said(contrast_db: float) -> None:
+    strategy = vibration(contrast_db=contrast_db)
+    if contrast_db <= 20:
+        assert strategy.band.lacking == ""
+    for row, state in zip(ROWS, standing(strategy), strict=True):
+        assert state.outcome is (Outcome.UNREACHABLE if strategy.band.lacking else Outcome.OK)
+        felt = np.abs(state.phasor) / LINKED.full_scale
+        assert np.all(felt[row == 0] <= 10 ** (-contrast_db / 20) * (1 + 1e-6))
+        # An idle floor, not silence: nothing would pass a resting actuator.
+        assert np.all(felt > 0)
+    if strategy.band.lacking:
+        assert strategy.band.lacking in strategy.note()
+
+
+def test_a_chain_rests_until_its_first_dot(strategy: Vibration) -> None:
+    np.testing.assert_array_equal(strategy.held(np.zeros(6), False), 0.0)
+    first = strategy.held(np.array([0, 1.0, 0, 0, 0, 0]), False)
+    assert np.all(first > 0)
+    assert first[1] == 1
+    after = strategy.held(np.zeros(6), True)
+    assert np.all((after > 0) & (after <= strategy.band.floor))
+
+
+def test_rest_is_silence(strategy: Vibration) -> None:
+    (rest,) = strategy.states(np.zeros((1, 6)))
+    assert rest.outcome is Outcome.OK
+    assert rest.epsilon == 0
+    assert rest.error == 0
+    assert not rest.phasor.any()
+
+
+def test_states_do_not_depend_on_their_company(strategy: Vibration, states: list[ChainState]) -> None:
+    for index in (1, 22, 63):
+        (alone,) = strategy.states(states[index].target[None])
+        np.testing.assert_allclose(alone.lam, states[index].lam, rtol=1e-7)
+        assert alone.epsilon == pytest.approx(states[index].epsilon, rel=1e-7)
+
+
+def check_ramp(ramp: Ramp, before: ChainState, after: ChainState) -> None:
+    """A ramp within the device that begins and ends in the states; a chain at rest takes any links."""
+    assert ramp.lacking == ""
+    assert ramp.duration_s <= 0.35
+    assert ramp.t_s[0] == 0
+    assert np.abs(ramp.epsilon).max() <= LINKED.epsilon_max
+    assert ramp.lam_t_s[0] == 0
+    assert ramp.lam_t_s[-1] == pytest.approx(ramp.duration_s, rel=1e-14)
+    allowed = LINKED.coupling.lam
+    assert np.all((ramp.lam >= allowed.min) & (ramp.lam <= allowed.max))
+    for node, state in ((0, before), (-1, after)):
+        assert ramp.epsilon[node] == pytest.approx(state.epsilon, rel=1e-13, abs=1e-15)
+        assert abs(ramp.epsilon_slope[node]) < 1e-4 * np.abs(ramp.epsilon_slope).max()
+        if state.phasor.any():
+            np.testing.assert_allclose(ramp.lam[node], state.lam, rtol=1e-13)
+
+
+def test_two_hundred_changes(strategy: Vibration, states: list[ChainState]) -> None:
+    rng = np.random.default_rng(11)
+    before, after = ([states[i] for i in rng.integers(0, 64, 200)] for _ in range(2))
+    for one, other, ramp in zip(before, after, strategy.ramps(before, after), strict=True):
+        if one is other:
+            assert ramp is None
+        else:
+            check_ramp(ramp, one, other)
+
+
+def test_the_way_in_and_out_of_every_row(strategy: Vibration, states: list[ChainState]) -> None:
+    rest = strategy.states(np.zeros((64, 6)))
+    for state, way_in, way_out in zip(states, strategy.ramps(rest, states), strategy.ramps(states, rest), strict=True):
+        check_ramp(way_in, rest[0], state)
+        check_ramp(way_out, state, rest[0])
+        assert np.ptp(way_in.lam, axis=0).max() < 0.02
+    assert strategy.ramps(rest[:1], rest[:1]) == [None]
+
+
+def test_slopes_are_the_derivatives(strategy: Vibration, states: list[ChainState]) -> None:
+    (rest,) = strategy.states(np.zeros((1, 6)))
+    for ramp in strategy.ramps([states[37], rest], [states[22], states[37]]):
+        middle = np.arange(2, len(ramp.t_s) - 2)
+        e, step = ramp.epsilon, ramp.t_s[1]
+        numeric = (8 * (e[middle + 1] - e[middle - 1]) - (e[middle + 2] - e[middle - 2])) / (12 * step)
+        np.testing.assert_allclose(ramp.epsilon_slope[middle], numeric, atol=2e-3 * np.abs(numeric).max())
+
+
+def integrated(device: Device, omega: float, ramps: list[Ramp], stands_s: float) -> list[NDArray[np.complex128]]:
+    """First harmonics under the full equations over each stand, after ramps that follow one another.
+
+    As `Ramp` says: the drive is cubic Hermite between nodes, links are straight between theirs.
+    """
+    n, scale = device.chain_length, device.tau_per_s
+    state, begin, felt = np.zeros(2 * n), 0.0, []
+    for ramp in ramps:
+        drive = CubicHermiteSpline(ramp.t_s * scale, ramp.epsilon, ramp.epsilon_slope / scale)
+        length = ramp.duration_s * scale
+
+        def slope(
+            tau: float, state: Floats, ramp: Ramp = ramp, drive: CubicHermiteSpline = drive, begin: float = begin,
+            length: float = length,
+        ) -> Floats:  # fmt: skip
+            z, at = state[:n], min(tau - begin, length)
+            out = np.concatenate([state[n:], -device.delta * state[n:] - z - device.beta * z**3])
+            out[n] += (complex(drive(at)) * np.exp(1j * omega * tau)).real
+            if n > 1:
+                k = min(int(at / length * (len(ramp.lam) - 1)), len(ramp.lam) - 2)
+                part = at / length * (len(ramp.lam) - 1) - k
+                out[n + 1 :] += ((1 - part) * ramp.lam[k] + part * ramp.lam[k + 1]) * (z[:-1] - z[1:])
+            return out
+
+        periods = int(stands_s * scale * omega / (2 * np.pi))
+        points = begin + length + 2 * np.pi / omega * np.arange(32 * periods + 1) / 32
+        ran = solve_ivp(slope, (begin, points[-1]), state, "DOP853", t_eval=points, rtol=1e-8, atol=1e-11, max_step=2.0)
+        turned = ran.y[:n, :-1] * np.exp(-1j * omega * points[:-1])
+        felt.append(2 * turned.reshape(n, periods, 32).mean(axis=2).T)
+        state, begin = ran.y[:, -1], float(points[-1])
+    return felt
+
+
+def test_a_short_story_under_the_full_equations(strategy: Vibration, states: list[ChainState]) -> None:
+    """Rest, three patterns, rest: 2 % of full scale and 19 dB from the first period on."""
+    (rest,) = strategy.states(np.zeros((1, 6)))
+    told = [rest, states[0b110011], states[0b010101], states[0b101110], rest]
+    felt = integrated(LINKED, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1)
+    for state, phasors in zip(told[1:], felt, strict=True):
+        np.testing.assert_allclose(
+            np.abs(phasors) / LINKED.full_scale, np.broadcast_to(state.target, phasors.shape), atol=0.02
+        )
+
+
+def test_a_single_actuator_under_the_full_equations() -> None:
+    strategy = vibration(SINGLE)
+    off, half, on = strategy.states(np.array([[0.0], [0.5], [1.0]]))
+    told = [off, on, half, off, on]
+    felt = integrated(SINGLE, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1)
+    for state, phasors in zip(told[1:], felt, strict=True):
+        np.testing.assert_allclose(np.abs(phasors) / SINGLE.full_scale, state.target[0], atol=2e-3)
+
+
+def test_single_actuators_are_silent_or_on() -> None:
+    strategy = vibration(SINGLE)
+    off, on = strategy.states(np.array([[0.0], [1.0]]))
+    np.testing.assert_array_equal(strategy.held(np.zeros(1), True), 0.0)
+    assert off.outcome is on.outcome is Outcome.OK
+    assert off.epsilon == 0
+    assert abs(on.phasor[0]) == pytest.approx(SINGLE.full_scale, rel=1e-7)
+    ramp, none = strategy.ramps([off, on], [on, on])
+    assert none is None
+    assert ramp.lam is None
+    assert ramp.lam_t_s is None
+
+
+def weak(**changes: object) -> Vibration:
+    return vibration(LINKED.model_copy(update=changes))
+
+
+@pytest.mark.parametrize("high", [1.0, 1.1, 1.2])
+def test_patterns_out_of_reach_are_said_to_be(high: float) -> None:
+    """Without detuning some profiles have no links at all; they are unreachable too, and their ways are sound."""
+    strategy = weak(omega=Span(min=0.9, max=high))
+    states = standing(strategy)
+    assert {state.outcome for state in states} == {Outcome.UNREACHABLE}
+    for state in states:
+        for array in (state.lam, state.phasor, state.bias, state.mean):
+            assert np.all(np.isfinite(array))
+        assert state.error == pytest.approx(
+            np.abs(np.abs(state.phasor) / LINKED.full_scale - state.target).max(), abs=1e-7
+        )
+    assert "lacks detuning" in strategy.note()
+    (rest,) = strategy.states(np.zeros((1, 6)))
+    assert rest.outcome is Outcome.OK
+    for ramp in strategy.ramps([rest, states[63], states[1]], [states[21], states[21], rest]):
+        assert ramp is None or (np.all(np.isfinite(ramp.epsilon)) and np.all(np.isfinite(ramp.lam)))
+
+
+@pytest.mark.parametrize("full_scale", [0.5, 0.8, 0.95])
+def test_near_the_hilltop_no_number_is_called_right(full_scale: float) -> None:
+    for state in standing(weak(full_scale=full_scale)):
+        assert state.outcome is not Outcome.OK
+
+
+def test_a_ramp_says_what_it_lacks(strategy: Vibration, states: list[ChainState]) -> None:
+    steady = max(abs(state.epsilon) for state in states) / LINKED.epsilon_per_volt
+    few_volts = weak(amplifier=LINKED.amplifier.model_copy(update={"volts": 0.5 * steady}))
+    few_links = weak(coupling=LINKED.coupling.model_copy(update={"lam": Span(min=0.0, max=0.3)}))
+    for lacking, word in ((few_volts, "volts"), (few_links, "range of lam")):
+        made = standing(lacking)
+        (ramp,) = lacking.ramps([made[0b111111]], [made[0b101010]])
+        assert word in ramp.lacking
+        assert word in lacking.note()
