@@ -70,6 +70,9 @@ def text(
     ] = None,
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
+    contrast: Annotated[
+        float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
+    ] = 20.0,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     as_json: Json = False,
 ) -> None:
@@ -90,7 +93,10 @@ def text(
         table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
         presentation=presentation, dots=dots, blank_between=blank_between,
     )  # fmt: skip
-    report = render_text(source, device=device, out=output, options=options, encoding=sample_format.value)
+    report = render_text(
+        source, device=device, out=output, options=options, encoding=sample_format.value,
+        contrast_db=contrast,
+    )  # fmt: skip
     _finish(report, as_json, ok=report.ok)
 
 

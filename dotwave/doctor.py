@@ -97,15 +97,13 @@ def _release(version: str) -> tuple[int, ...]:
 
 
 def _liblouis() -> Check:
-    from encoders import EncodeError, liblouis_version, list_tables
+    from encoders import EncodeError, liblouis_place, liblouis_version, list_tables
 
     try:
         version, tables = liblouis_version(), len(list_tables())
     except EncodeError as error:
         return Check("liblouis", "not usable", str(error))
-    # `encoders` has found and loaded the binding; here it is only asked where from.
-    place = getattr(sys.modules.get("louis"), "__file__", "unknown place")
-    return Check("liblouis", f"{version}, {tables} tables, {place}")
+    return Check("liblouis", f"{version}, {tables} tables, {liblouis_place()}")
 
 
 def _shadows() -> Iterator[Check]:

@@ -12,7 +12,7 @@ import numpy as np
 from chainsim import Device, Outcome, load_device
 from drivers import Encoding, WrittenWaveform, write_waveform
 from encoders import EncodingReport, GridShape, TextFrames, TextOptions, TextScene, encode_text
-from planner import FramePlan, Plan, plan_scene
+from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
 from .progress import progress
 from .report import TextReport
@@ -24,7 +24,15 @@ __all__ = ["render_text"]
 MOST_CHECKED = 100_000
 
 
-def render_text(source: str, *, device: str, out: Path | None, options: TextOptions, encoding: Encoding) -> TextReport:
+def render_text(
+    source: str,
+    *,
+    device: str,
+    out: Path | None,
+    options: TextOptions,
+    encoding: Encoding,
+    contrast_db: float = DEFAULT_CONTRAST_DB,
+) -> TextReport:
     """Encode text, plan it on a device and, with `out`, write the waveform.
 
     Nothing is written when a frame cannot be made as asked: the report then says what is lacking and what
@@ -33,6 +41,7 @@ def render_text(source: str, *, device: str, out: Path | None, options: TextOpti
     Parameters
     ----------
     source : a file, ``-``, or the text itself. device : profile name or file. out : the .wav.
+    contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
 
     Raises
     ------
@@ -43,7 +52,7 @@ def render_text(source: str, *, device: str, out: Path | None, options: TextOpti
     profile = load_device(device)
     text = text_source(source)
     scene = encode_text(text, GridShape(profile.rows, profile.cols), options)
-    watch = _Watch(plan_scene(scene, profile), stop_at_failure=out is not None)
+    watch = _Watch(plan_scene(scene, profile, contrast_db=contrast_db), stop_at_failure=out is not None)
     written: WrittenWaveform | None = None
     with progress("rendering") as update:
         try:
@@ -73,6 +82,8 @@ class _Watch:
     ramp_s: float = 0.0
     error: float = 0.0
     volts: float = 0.0
+    well: float = 0.0
+    noise_gain: float = 1.0
     failed: FramePlan | None = None
     failed_number: int = 0
 
@@ -83,6 +94,8 @@ class _Watch:
             self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
             self.error = max(self.error, *(state.error for state in frame.states))
             self.volts = max(self.volts, *(state.margins.volts for state in frame.states))
+            self.well = max(self.well, *(state.margins.well for state in frame.states))
+            self.noise_gain = max(self.noise_gain, *(state.margins.noise_gain for state in frame.states))
             if frame.outcome is not Outcome.OK and self.failed is None:
                 self.failed, self.failed_number = frame, number
                 if self.stop_at_failure:
@@ -107,6 +120,8 @@ def _report(device: Device, scene: TextScene, watch: _Watch, written: WrittenWav
         limit_volts=device.amplifier.volts,
         ramp_s=watch.ramp_s,
         error=watch.error,
+        well=watch.well,
+        noise_gain=watch.noise_gain,
         outcomes=watch.outcomes,
         undefined=_undefined(encoded),
         split=tuple(

@@ -50,6 +50,8 @@ class TextReport:
     undefined : characters the table cannot write and what was shown instead.
     split : words cut at a page's end. differences : what back-translation does not give again.
     notes : sentences a person should read. seconds : time taken.
+    well : largest deflection over the limit of the softening well, noise_gain : largest magnification of
+        disturbances of any pattern (both as in `planner.Margins`).
     """
 
     device: str
@@ -69,6 +71,8 @@ class TextReport:
     differences: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
+    well: float = 0.0
+    noise_gain: float = 1.0
 
     @property
     def ok(self) -> bool:
@@ -88,6 +92,9 @@ class TextReport:
         yield f"Duration: {self.duration_s:.2f} s."
         yield f"Tables: {', '.join(self.tables)}."
         yield f"Peak: {self.peak_volts:.1f} V of {self.limit_volts:g} V."
+        yield f"Deflection: at most {100 * self.well:.0f} % of the softening well's limit."
+        if self.noise_gain > 1:
+            yield f"Disturbances of the drive: magnified up to {self.noise_gain:.1g} times more than the drive."
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         yield f"Predicted error of the settled patterns: {100 * self.error:.2f} % of full scale."
         if not self.ok:

@@ -14,6 +14,7 @@ from .errors import (
     UnsupportedSource,
 )
 from .layout import join_pages
+from .louis_binding import place as liblouis_place
 from .louis_binding import version as liblouis_version
 from .presentation import Presentation, read_cells
 from .report import EncodingReport, Split, UndefinedUse
@@ -61,6 +62,7 @@ __all__ = [
     "covered_text",
     "encode_text",
     "join_pages",
+    "liblouis_place",
     "liblouis_version",
     "list_tables",
     "read_cells",

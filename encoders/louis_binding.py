@@ -25,6 +25,7 @@ __all__ = [
     "complaint",
     "hyphenate",
     "listed_tables",
+    "place",
     "table_info",
     "translate",
     "translate_string",
@@ -101,6 +102,12 @@ def _declare(library: Any) -> None:
     library.lou_findTable.argtypes = (ctypes.c_char_p,)
     library.lou_getTableInfo.restype = ctypes.c_char_p
     library.lou_getTableInfo.argtypes = (ctypes.c_char_p, ctypes.c_char_p)
+
+
+def place() -> str:
+    """The file the binding was loaded from."""
+    with _lock:
+        return str(_louis().__file__)
 
 
 def version() -> str:

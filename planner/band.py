@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from chainsim import Device
 
 from .envelopes import change, rise
+from .floor import idle_profiles
 from .links import drive_for, links_for
 
-__all__ = ["LOWER", "NODES_PER_RAMP", "Band", "choose_band"]
+__all__ = ["NODES_PER_RAMP", "Band", "choose_band"]
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +23,6 @@ CANDIDATES = 41
 NODES_PER_RAMP = 251
 # Half of the volts stay free for what a closed form does not know.
 STEADY_SHARE = 0.5
-# The lower of the two levels an unraised dot may take, in units of the floor.
-LOWER = 0.5
 
 
 @dataclass(frozen=True)
@@ -75,8 +74,8 @@ def _probes(device: Device, floor: float) -> Floats:
     """On/off profiles with every kind of step: all, none, alternating, blocks."""
     m = np.arange(device.chain_length)
     shapes = np.array([m >= 0, m < 0, m % 2 == 0, m % 2 == 1, m // 2 % 2 == 0, m // 2 % 2 == 1])
-    unraised = floor * np.where(m % 2 == 0, 1.0, LOWER)
-    return np.asarray(np.where(shapes, 1.0, unraised) * device.full_scale)
+    deepest = [idle_profiles(shape.astype(np.float64), floor)[-1] for shape in shapes]
+    return np.asarray(deepest) * device.full_scale
 
 
 def _lack(device: Device, omega: float, ramp_s: float, floor: float) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +12,9 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from . import jets
-from .band import LOWER, NODES_PER_RAMP, Band, choose_band
+from .band import NODES_PER_RAMP, Band, choose_band
 from .envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
+from .floor import idle_profiles
 from .hermite import broken_line
 from .links import detuning_gain, links_for
 from .plan import ChainState, Margins, Ramp
@@ -32,8 +32,6 @@ PIECE_S = 2.5e-3
 # Where a state magnifies disturbances this much, shorter ones: the line's error is one of them.
 FINE_PIECE_S = 1.5e-3
 DELICATE = 1e6
-# Up to so many unraised dots every mix of levels is tried.
-MOST_CHOSEN = 8
 # Largest share of the hilltop amplitude that a ramp may pass through.
 WELL_SHARE = 0.8
 
@@ -63,25 +61,11 @@ class Vibration(Strategy):
         """
         if not started and not np.any(target):
             return target
-        unraised = target < self.band.floor
-        if not unraised.any():
-            return target
-        # A step up by twice the contrast would bring its stage's resonance too near the drive.
-        free = np.flatnonzero(unraised & np.append(unraised[1:], True))
-        choices = self._levels(len(free))
-        profiles = np.repeat(np.maximum(target, self.band.floor)[None, :], len(choices), axis=0)
-        profiles[:, free] = choices * self.band.floor
+        profiles = idle_profiles(target, self.band.floor)
         amplitude = profiles * self.device.full_scale
         lam = links_for(self.device.chain, amplitude, self.band.omega)
         gain = detuning_gain(self.device.chain, amplitude, lam, self.band.omega)
         return np.asarray(profiles[int(np.argmin(np.where(np.isfinite(gain), gain, np.inf)))])
-
-    @staticmethod
-    def _levels(count: int) -> Floats:
-        """Levels of `count` unraised dots to choose from, in units of the floor: float64, shape (choices, count)."""
-        if count > MOST_CHOSEN:
-            return np.array([[1.0 if m % 2 == 0 else LOWER for m in range(count)]])
-        return np.array(list(product((1.0, LOWER), repeat=count)))
 
     def note(self) -> str:
         """What is lacking."""
