@@ -18,10 +18,11 @@ from .louis_binding import place as liblouis_place
 from .louis_binding import version as liblouis_version
 from .presentation import Presentation, read_cells
 from .report import EncodingReport, Split, UndefinedUse
-from .scene import Frame, GridShape, PatternKind, Scene, TargetPattern
+from .scene import Frame, GridShape, PatternKind, Scene, TargetPattern, WalkingBars
 from .sources import SourceKind, TextSource
 from .tables import TableInfo, list_tables, resolve_tables
 from .text import TextFrames, TextOptions, TextScene, encode_text
+from .textures import Region, TextureError, bars, levels, plane_wave, regions, walking_bars
 from .transcribe import Translation, translate
 from .undefined import Undefined
 
@@ -38,6 +39,7 @@ __all__ = [
     "LouisMissing",
     "PatternKind",
     "Presentation",
+    "Region",
     "Scene",
     "SourceKind",
     "Split",
@@ -48,13 +50,16 @@ __all__ = [
     "TextOptions",
     "TextScene",
     "TextSource",
+    "TextureError",
     "Translation",
     "Undefined",
     "UndefinedCharacter",
     "UndefinedUse",
     "UnsupportedSource",
+    "WalkingBars",
     "back_check",
     "back_translate",
+    "bars",
     "bits_to_cell",
     "brf_to_cells",
     "cell_to_bits",
@@ -62,10 +67,14 @@ __all__ = [
     "covered_text",
     "encode_text",
     "join_pages",
+    "levels",
     "liblouis_place",
     "liblouis_version",
     "list_tables",
+    "plane_wave",
     "read_cells",
+    "regions",
     "resolve_tables",
     "translate",
+    "walking_bars",
 ]

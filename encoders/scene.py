@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Frame", "GridShape", "PatternKind", "Scene", "TargetPattern"]
+__all__ = ["Frame", "GridShape", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,13 @@ class PatternKind(StrEnum):
 
 
 @dataclass(frozen=True)
+class WalkingBars:
+    """Bars that walk along the rows: two tones that beat; `width` of a bar in actuators."""
+
+    width: float
+
+
+@dataclass(frozen=True)
 class TargetPattern:
     """A wish for one moment.
 
@@ -39,12 +46,14 @@ class TargetPattern:
     kind : on/off, sine or bars.
     weight : float64, shape (rows, cols), 0 = don't care; None means 1 everywhere.
     phase_matters : whether the arguments of `amplitude` are part of the wish.
+    walking : the amplitude is the largest that passes by, in bars that walk; None for what stands.
     """
 
     amplitude: NDArray[np.complex128]
     kind: PatternKind = PatternKind.ON_OFF
     weight: NDArray[np.float64] | None = None
     phase_matters: bool = False
+    walking: WalkingBars | None = None
 
 
 @dataclass(frozen=True, slots=True)

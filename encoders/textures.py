@@ -1,0 +1,145 @@
+"""Textures as targets: waves, bars and levels, and regions of them side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import EncodeError
+from .scene import GridShape, PatternKind, TargetPattern, WalkingBars
+
+__all__ = ["Region", "TextureError", "bars", "levels", "plane_wave", "regions", "walking_bars"]
+
+Complexes = NDArray[np.complex128]
+
+
+class TextureError(EncodeError, ValueError):
+    """A texture cannot be what it is asked to be.
+
+    Examples: a level above 1; bars of width 0; regions that overlap or leave the grid.
+    """
+
+
+def plane_wave(shape: GridShape, *, lag_deg: float, row_lag_deg: float = 0.0, level: float = 1.0) -> TargetPattern:
+    """A sinusoidal wave of one amplitude: each actuator lags its left neighbour by `lag_deg` and its upper
+    one by `row_lag_deg`, so that it travels right (and down) where the lags are positive.
+
+    Raises
+    ------
+    TextureError
+        When a lag is not finite or the level is not in (0, 1].
+    """
+    if not (math.isfinite(lag_deg) and math.isfinite(row_lag_deg)):
+        raise TextureError(f"wave: expected finite lags, got {lag_deg} and {row_lag_deg}")
+    row, col = np.ogrid[: shape.rows, : shape.cols]
+    phase = -np.deg2rad(lag_deg * col + row_lag_deg * row)
+    return _target(_level(level) * np.exp(1j * phase), PatternKind.SINE, phase_matters=True)
+
+
+def bars(
+    shape: GridShape, *, vertical: bool, width: int, gap: int, first: int = 0, level: float = 1.0
+) -> TargetPattern:
+    """Still bars: `width` raised columns (vertical) or rows, `gap` flat ones between; the first begins at `first`.
+
+    Raises
+    ------
+    TextureError
+        When width or gap is below 1, or the level is not in (0, 1].
+    """
+    if width < 1 or gap < 1:
+        raise TextureError(f"bars: expected width and gap of 1 or more actuators, got {width} and {gap}")
+    place = np.arange(shape.cols if vertical else shape.rows)
+    raised = (place - first) % (width + gap) < width
+    line = np.where(raised, _level(level), 0.0)
+    grid = np.broadcast_to(line if vertical else line[:, None], (shape.rows, shape.cols))
+    return _target(grid, PatternKind.BARS)
+
+
+def walking_bars(shape: GridShape, *, width: float, level: float = 1.0) -> TargetPattern:
+    """Vertical bars that walk: two tones whose lags differ by pi/width beat with bars `width` actuators wide.
+
+    The rate at which they walk follows from the device (physics: f0 delta tan(pi / 2 width) for equal unit
+    gains); the plan says it.
+
+    Raises
+    ------
+    TextureError
+        When the width is below 1.2 (lags beyond 165 degrees) or the level is not in (0, 1].
+    """
+    if not (math.isfinite(width) and width >= 1.2):
+        raise TextureError(f"walking bars: expected a width of at least 1.2 actuators, got {width}")
+    grid = np.full((shape.rows, shape.cols), _level(level))
+    return _target(grid, PatternKind.BARS, walking=WalkingBars(width))
+
+
+def levels(amplitude: ArrayLike) -> TargetPattern:
+    """A map of still levels, shape (rows, cols), each 0..1.
+
+    Raises
+    ------
+    TextureError
+        When it is not a table of such numbers.
+    """
+    grid = np.asarray(amplitude, dtype=np.float64)
+    if grid.ndim != 2 or not grid.size:
+        raise TextureError(f"levels: expected rows of numbers, got shape {grid.shape}")
+    if not np.all((grid >= 0) & (grid <= 1)):
+        wrong = grid[~((grid >= 0) & (grid <= 1))].flat[0]
+        raise TextureError(f"levels: expected numbers from 0 to 1, got {wrong}")
+    return _target(grid, PatternKind.ON_OFF)
+
+
+@dataclass(frozen=True)
+class Region:
+    """A texture on some rows and columns of the grid: `top` <= row < `bottom`, `left` <= col < `right`."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+    texture: TargetPattern
+
+
+def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
+    """Textures side by side; what no region covers is flat.
+
+    Each region shows its part of a texture made for the whole grid. The phase of waves is part of the wish.
+
+    Raises
+    ------
+    TextureError
+        When a region leaves the grid, overlaps another, holds walking bars, or was made for another grid.
+    """
+    amplitude = np.zeros((shape.rows, shape.cols), dtype=np.complex128)
+    taken = np.zeros(amplitude.shape, dtype=np.bool_)
+    for number, part in enumerate(parts):
+        inside = 0 <= part.top < part.bottom <= shape.rows and 0 <= part.left < part.right <= shape.cols
+        if not inside or part.texture.amplitude.shape != amplitude.shape:
+            raise TextureError(f"region {number}: does not fit a grid of {shape.rows} x {shape.cols}")
+        if part.texture.walking is not None:
+            raise TextureError(f"region {number}: walking bars fill whole rows; show them in a frame of their own")
+        window = (slice(part.top, part.bottom), slice(part.left, part.right))
+        if taken[window].any():
+            raise TextureError(f"region {number}: overlaps one before it")
+        taken[window] = True
+        amplitude[window] = part.texture.amplitude[window]
+    waves = [part.texture.kind for part in parts if part.texture.phase_matters]
+    return _target(amplitude, waves[0] if waves else PatternKind.ON_OFF, phase_matters=bool(waves))
+
+
+def _level(level: float) -> float:
+    if not 0 < level <= 1:
+        raise TextureError(f"level: expected a number above 0 and up to 1, got {level}")
+    return level
+
+
+def _target(
+    amplitude: ArrayLike, kind: PatternKind, *, phase_matters: bool = False, walking: WalkingBars | None = None
+) -> TargetPattern:
+    grid: Complexes = np.array(amplitude, dtype=np.complex128)
+    grid.flags.writeable = False
+    return TargetPattern(grid, kind, phase_matters=phase_matters, walking=walking)
