@@ -62,6 +62,8 @@ class Vibration(Strategy):
         if not started and not np.any(target):
             return target
         profiles = idle_profiles(target, self.band.floor)
+        if len(profiles) == 1:
+            return np.asarray(profiles[0])
         amplitude = profiles * self.device.full_scale
         lam = links_for(self.device.chain, amplitude, self.band.omega)
         gain = detuning_gain(self.device.chain, amplitude, lam, self.band.omega)

@@ -147,7 +147,9 @@ def test_slopes_are_the_derivatives(strategy: Vibration, states: list[ChainState
         np.testing.assert_allclose(ramp.epsilon_slope[middle], numeric, atol=2e-3 * np.abs(numeric).max())
 
 
-def integrated(device: Device, omega: float, ramps: list[Ramp], stands_s: float) -> list[NDArray[np.complex128]]:
+def integrated(
+    device: Device, omega: float, ramps: list[Ramp], *, stands_s: float, rtol: float
+) -> list[NDArray[np.complex128]]:
     """First harmonics under the full equations over each stand, after ramps that follow one another.
 
     As `Ramp` says: the drive is cubic Hermite between nodes, links are straight between theirs.
@@ -173,29 +175,40 @@ def integrated(device: Device, omega: float, ramps: list[Ramp], stands_s: float)
 
         periods = int(stands_s * scale * omega / (2 * np.pi))
         points = begin + length + 2 * np.pi / omega * np.arange(32 * periods + 1) / 32
-        ran = solve_ivp(slope, (begin, points[-1]), state, "DOP853", t_eval=points, rtol=1e-8, atol=1e-11, max_step=2.0)
+        ran = solve_ivp(
+            slope, (begin, points[-1]), state, "DOP853", t_eval=points, rtol=rtol, atol=1e-4 * rtol, max_step=2.0
+        )
         turned = ran.y[:n, :-1] * np.exp(-1j * omega * points[:-1])
         felt.append(2 * turned.reshape(n, periods, 32).mean(axis=2).T)
         state, begin = ran.y[:, -1], float(points[-1])
     return felt
 
 
-def test_a_short_story_under_the_full_equations(strategy: Vibration, states: list[ChainState]) -> None:
-    """Rest, three patterns, rest: 2 % of full scale and 19 dB from the first period on."""
+@pytest.mark.parametrize(
+    ("rows", "rtol"),
+    [((0b110011, 0b010101, 0b101110), 1e-9), ((0b111110, 0b111111), 1e-12)],
+    ids=["mixed", "full"],
+)
+def test_a_short_story_under_the_full_equations(
+    rows: tuple[int, ...], rtol: float, strategy: Vibration, states: list[ChainState]
+) -> None:
+    """Rest, patterns, rest: patterns within 2 % of full scale from the first period on, silence below the floor.
+
+    Six raised dots alike magnify noise a billion times, that of an integrator too: hence its tolerance.
+    """
     (rest,) = strategy.states(np.zeros((1, 6)))
-    told = [rest, states[0b110011], states[0b010101], states[0b101110], rest]
-    felt = integrated(LINKED, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1)
+    told = [rest, *(states[row] for row in rows), rest]
+    felt = integrated(LINKED, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.05, rtol=rtol)
     for state, phasors in zip(told[1:], felt, strict=True):
-        np.testing.assert_allclose(
-            np.abs(phasors) / LINKED.full_scale, np.broadcast_to(state.target, phasors.shape), atol=0.02
-        )
+        off = np.abs(phasors) / LINKED.full_scale - state.target
+        assert np.abs(off).max() < (0.02 if state.target.any() else 0.05)
 
 
 def test_a_single_actuator_under_the_full_equations() -> None:
     strategy = vibration(SINGLE)
     off, half, on = strategy.states(np.array([[0.0], [0.5], [1.0]]))
     told = [off, on, half, off, on]
-    felt = integrated(SINGLE, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1)
+    felt = integrated(SINGLE, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1, rtol=1e-9)
     for state, phasors in zip(told[1:], felt, strict=True):
         np.testing.assert_allclose(np.abs(phasors) / SINGLE.full_scale, state.target[0], atol=2e-3)
 
