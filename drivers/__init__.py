@@ -8,11 +8,13 @@ from .limits import LimitCheck
 from .manifest import FrameMark, Manifest
 from .manifest_reader import read_manifest
 from .pair import WrittenWaveform, read_waveform, write_waveform
+from .samples import SUFFIXES, SampleReader, SampleWriter
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
 from .waveform import Waveform
 
 __all__ = [
+    "SUFFIXES",
     "Channel",
     "CouplingEvent",
     "DriverError",
@@ -23,6 +25,8 @@ __all__ = [
     "LimitError",
     "Manifest",
     "Role",
+    "SampleReader",
+    "SampleWriter",
     "UnreadableWaveform",
     "WavReader",
     "WavWriter",

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from planner import FramePlan, Plan
 
 from .channels import channels_of
-from .errors import FileError, UnreadableWaveform
+from .errors import UnreadableWaveform
 from .files import atomic_paths, naming, opened
 from .limits import LimitCheck
 from .manifest import Manifest, ManifestWriter, digest_of
 from .manifest_reader import read_manifest
-from .wav import Encoding, WavWriter
-from .wav_reader import WavReader
+from .samples import SampleReader, check_suffix, open_samples, writer_for
+from .wav import Encoding
 from .waveform import Waveform
 
 __all__ = ["WrittenWaveform", "read_waveform", "write_waveform"]
@@ -54,7 +54,7 @@ def write_waveform(
     encoding: Encoding = "float32",
     progress: Callable[[float], None] | None = None,
 ) -> WrittenWaveform:
-    """Carry out `plan` into `path` (a .wav) and the manifest beside it (.json).
+    """Carry out `plan` into `path` (.wav, .npz, .csv or .raw) and the manifest beside it (.json).
 
     Both files appear whole, or neither. The plan's frames are drawn once, and memory does not grow with
     their number. `progress` is called with the seconds written so far.
@@ -66,11 +66,10 @@ def write_waveform(
     LimitError
         When a sample is over the amplifier's volts or slew, or does not fit PCM24.
     FileError
-        When `path` does not end in .wav, or the file system refuses.
+        When the ending of `path` stands for no format, or the file system refuses.
     """
     path = Path(path)
-    if path.suffix.lower() != ".wav":
-        raise FileError(f"{path}: expected a name that ends in .wav")
+    check_suffix(path)
     manifest_path = path.with_suffix(".json")
     with (
         atomic_paths(path, manifest_path) as (aside, manifest_aside),
@@ -80,7 +79,7 @@ def write_waveform(
         check = LimitCheck(plan.device.amplifier, waveform.channels)
         with opened(aside, path) as file:
             with naming(path):
-                writer = WavWriter(file, waveform.channels, waveform.rate_hz, encoding)
+                writer = writer_for(path, file, waveform.channels, waveform.rate_hz, encoding)
             for block in waveform.blocks(BLOCK):
                 check.check(block)
                 with naming(path):
@@ -107,7 +106,7 @@ def _marked(frames: Iterable[FramePlan], marks: ManifestWriter) -> Iterator[Fram
         marks.add(frame)
 
 
-def read_waveform(path: Path | str) -> tuple[Manifest, WavReader]:
+def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     """The manifest and the samples of a written waveform, by the path of either file.
 
     The samples are in volts. The digest is checked only when asked for, by `Manifest.check_digest`.
@@ -127,7 +126,7 @@ def read_waveform(path: Path | str) -> tuple[Manifest, WavReader]:
         raise UnreadableWaveform(
             f"{manifest_path}: samples_file: it belongs to {manifest.samples_file}, not {path.name}"
         )
-    reader = WavReader.open(samples_path, [channel.volts_per_unit for channel in manifest.channels])
+    reader = open_samples(samples_path, manifest.channels, manifest.rate_hz)
     for name, said, found in (
         ("rate_hz", manifest.rate_hz, reader.rate_hz),
         ("samples", manifest.samples, reader.samples),
