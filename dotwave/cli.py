@@ -7,15 +7,17 @@ on stderr; 130 after Ctrl-C; 143 after SIGTERM. Imports that take time stay insi
 from __future__ import annotations
 
 import json
-import re
 import signal
 import sys
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, Protocol
+from typing import Annotated, NoReturn
 
 import typer
 
+from .cli_play import play_app
+from .command import Device, Json, Written, printable
+from .command import finish as _finish
 from .errors import Terminated, bad_input
 from .options import Dots, Presentation, SampleFormat, Undefined
 
@@ -31,25 +33,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-Device = Annotated[
-    str, typer.Option("--device", "-d", help="A built-in profile or a YAML file; see `dotwave devices`.")
-]
-Written = Annotated[str, typer.Argument(metavar="OUT", help="A waveform written by `dotwave text` (.wav or .json).")]
 GAP = "in actuators."
-CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-
-
-class Report(Protocol):
-    """What a command prints."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
-        ...
-
-    def as_text(self) -> str:
-        """Lines of plain text."""
-        ...
 
 
 @app.command(short_help="Render text as Braille that can be felt.")
@@ -213,15 +197,7 @@ def doctor(as_json: Json = False) -> None:
     _finish(report, as_json, ok=report.ok)
 
 
-def _finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
-    shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
-    typer.echo(_printable(shown))
-    raise typer.Exit(0 if ok else 1)
-
-
-def _printable(words: str) -> str:
-    """`words` without control characters, which a text could use to write over the terminal."""
-    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", words)
+app.add_typer(play_app)
 
 
 def _terminate(number: int, _frame: object) -> NoReturn:
@@ -244,5 +220,5 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     except bad_input() as error:
-        typer.echo(f"dotwave: {_printable(' '.join(str(error).split()))}", err=True)
+        typer.echo(f"dotwave: {printable(' '.join(str(error).split()))}", err=True)
         sys.exit(2)

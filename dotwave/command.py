@@ -1,0 +1,42 @@
+"""What the commands of the command line share: options, and the way a result is printed."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Annotated, Any, NoReturn, Protocol
+
+import typer
+
+__all__ = ["Device", "Json", "Report", "Written", "finish", "printable"]
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Device = Annotated[
+    str, typer.Option("--device", "-d", help="A built-in profile or a YAML file; see `dotwave devices`.")
+]
+Written = Annotated[str, typer.Argument(metavar="OUT", help="A waveform written by `dotwave text` (.wav or .json).")]
+CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+
+
+class Report(Protocol):
+    """What a command prints."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+        ...
+
+    def as_text(self) -> str:
+        """Lines of plain text."""
+        ...
+
+
+def finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
+    """Print a report, as JSON or as text, and end with exit code 0 or 1."""
+    shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
+    typer.echo(printable(shown))
+    raise typer.Exit(0 if ok else 1)
+
+
+def printable(words: str) -> str:
+    """`words` without control characters, which a text could use to write over the terminal."""
+    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", words)

@@ -1,0 +1,341 @@
+"""What the packets say: one dataclass a kind, with its payload's bytes; all numbers little-endian."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .packet import MAX_PAYLOAD, Kind, Packet
+
+__all__ = [
+    "FULL_CODE",
+    "VERSION",
+    "Ack",
+    "Bias",
+    "Capabilities",
+    "Codes",
+    "Flag",
+    "LinkCoupling",
+    "Mark",
+    "Marked",
+    "Refused",
+    "Samples",
+    "Start",
+    "State",
+    "Tone",
+    "Tones",
+]
+
+Codes = NDArray[np.int16]
+
+VERSION = 1
+FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
+
+
+class State(IntEnum):
+    """What the controller's output does."""
+
+    IDLE = 0
+    FILLING = 1
+    PLAYING = 2
+    HELD = 3
+    DONE = 4
+    STOPPED = 5
+
+
+class Flag(IntFlag):
+    """What an ACK also says: GAP asks the host to send again from `next_number`."""
+
+    GAP = 1
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a controller can do, and where its session stands.
+
+    Attributes
+    ----------
+    rows, cols, channels, rate_hz : the grid and its outputs. bits : of a sample; 16 in version 1.
+    buffer_samples, event_slots : room for samples (per channel) and for events. max_payload : bytes.
+    full_volts : volts of sample code 32767. lam_step : lam of coupling code 1; lam_max : the largest lam.
+    watchdog_ms : silence after which the output is at zero; ramp_ms : how long the ramp to zero takes.
+    session : of the host it is serving, 0 for none. next_number : the ordered packet it waits for.
+    """
+
+    version: int
+    rows: int
+    cols: int
+    channels: int
+    rate_hz: int
+    bits: int
+    buffer_samples: int
+    event_slots: int
+    max_payload: int
+    full_volts: float
+    lam_step: float
+    lam_max: float
+    watchdog_ms: int
+    ramp_ms: int
+    session: int
+    next_number: int
+    name: str = ""
+
+    _struct: ClassVar = struct.Struct("<HHHHIBIHHfffHHII")
+
+    def packet(self) -> Packet:
+        """As bytes."""
+        numbers = (
+            self.version, self.rows, self.cols, self.channels, self.rate_hz, self.bits, self.buffer_samples,
+            self.event_slots, self.max_payload, self.full_volts, self.lam_step, self.lam_max, self.watchdog_ms,
+            self.ramp_ms, self.session, self.next_number,
+        )  # fmt: skip
+        return Packet(Kind.CAPABILITIES, 0, self._struct.pack(*numbers) + self.name.encode()[:80])
+
+    @classmethod
+    def of(cls, packet: Packet) -> Capabilities:
+        """From bytes."""
+        name = packet.payload[cls._struct.size :].decode("utf-8", "replace")
+        return cls(*(*cls._struct.unpack_from(packet.payload), name))
+
+
+@dataclass(frozen=True)
+class Start:
+    """A session begins: `total` samples will come (or, `parametric`, tones and biases for as long).
+
+    `note` is for people and recorders (JSON); a controller may pass over it.
+    """
+
+    session: int
+    parametric: bool
+    rate_hz: int
+    total: int
+    note: bytes = b""
+
+    _struct: ClassVar = struct.Struct("<IBIQ")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        head = self._struct.pack(self.session, self.parametric, self.rate_hz, self.total)
+        return Packet(Kind.START, number, head + self.note)
+
+    @classmethod
+    def of(cls, packet: Packet) -> Start:
+        """From bytes."""
+        session, parametric, rate_hz, total = cls._struct.unpack_from(packet.payload)
+        return cls(session, bool(parametric), rate_hz, total, packet.payload[cls._struct.size :])
+
+
+@dataclass(frozen=True)
+class LinkCoupling:
+    """From sample `at` the links of `row` move to `codes` (times lam_step), linearly over `ramp` samples."""
+
+    at: int
+    row: int
+    ramp: int
+    codes: tuple[int, ...]
+
+    _struct: ClassVar = struct.Struct("<QHI")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        codes = struct.pack(f"<{len(self.codes)}H", *self.codes)
+        return Packet(Kind.COUPLING, number, self._struct.pack(self.at, self.row, self.ramp) + codes)
+
+    @classmethod
+    def of(cls, packet: Packet) -> LinkCoupling:
+        """From bytes."""
+        at, row, ramp = cls._struct.unpack_from(packet.payload)
+        rest = packet.payload[cls._struct.size :]
+        return cls(at, row, ramp, struct.unpack(f"<{len(rest) // 2}H", rest))
+
+
+@dataclass(frozen=True)
+class Bias:
+    """From sample `at` the constant part of `channel` moves to `volts`, linearly over `ramp` samples."""
+
+    at: int
+    channel: int
+    ramp: int
+    volts: float
+
+    _struct: ClassVar = struct.Struct("<QHIf")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        return Packet(Kind.BIAS, number, self._struct.pack(self.at, self.channel, self.ramp, self.volts))
+
+    @classmethod
+    def of(cls, packet: Packet) -> Bias:
+        """From bytes."""
+        return cls(*cls._struct.unpack(packet.payload))
+
+
+@dataclass(frozen=True)
+class Tone:
+    """``volts * cos(2 pi hz t + phase)``, t in seconds from sample 0 of the session, phase in radians."""
+
+    volts: float
+    hz: float
+    phase: float
+
+
+@dataclass(frozen=True)
+class Tones:
+    """From sample `at` the tones of `channel` give way to these: cross-faded linearly over `ramp` samples."""
+
+    at: int
+    channel: int
+    ramp: int
+    tones: tuple[Tone, ...]
+
+    _struct: ClassVar = struct.Struct("<QHI")
+    _tone: ClassVar = struct.Struct("<fff")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        tones = b"".join(self._tone.pack(tone.volts, tone.hz, tone.phase) for tone in self.tones)
+        return Packet(Kind.TONES, number, self._struct.pack(self.at, self.channel, self.ramp) + tones)
+
+    @classmethod
+    def of(cls, packet: Packet) -> Tones:
+        """From bytes."""
+        rest = packet.payload[cls._struct.size :]
+        tones = tuple(Tone(*values) for values in cls._tone.iter_unpack(rest))
+        return cls(*(*cls._struct.unpack_from(packet.payload), tones))
+
+
+@dataclass(frozen=True)
+class Mark:
+    """When sample `at` goes out, say so; `note` is for people and recorders (JSON)."""
+
+    at: int
+    frame: int
+    note: bytes = b""
+
+    _struct: ClassVar = struct.Struct("<QI")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        return Packet(Kind.MARK, number, self._struct.pack(self.at, self.frame) + self.note)
+
+    @classmethod
+    def of(cls, packet: Packet) -> Mark:
+        """From bytes."""
+        return cls(*(*cls._struct.unpack_from(packet.payload), packet.payload[cls._struct.size :]))
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The samples from `first` on; int16, shape (S, channels), full_volts / 32767 volts a step."""
+
+    first: int
+    codes: Codes
+
+    _struct: ClassVar = struct.Struct("<QH")
+
+    @staticmethod
+    def most(channels: int, max_payload: int) -> int:
+        """How many samples of all channels fit into one packet; 0 when not even one does."""
+        return (min(max_payload, MAX_PAYLOAD) - Samples._struct.size) // (2 * channels)
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        head = self._struct.pack(self.first, len(self.codes))
+        return Packet(Kind.SAMPLES, number, head + self.codes.astype("<i2").tobytes())
+
+    @classmethod
+    def of(cls, packet: Packet, channels: int) -> Samples | None:
+        """From bytes; None when there are not `count` samples of `channels` channels."""
+        first, count = cls._struct.unpack_from(packet.payload)
+        flat = np.frombuffer(packet.payload, dtype="<i2", offset=cls._struct.size)
+        if not count or len(flat) != count * channels:
+            return None
+        return cls(first, flat.reshape(count, channels).astype(np.int16, copy=False))
+
+
+@dataclass(frozen=True)
+class Ack:
+    """Where the controller stands. Credits are absolute, so a lost or repeated ACK does no harm.
+
+    Attributes
+    ----------
+    next_number : the ordered packet it waits for; all before it are safe.
+    accept_samples : it has room for samples before this one. accept_events : and for events before this one
+        of the session's (START, END and SAMPLES are none).
+    received, played : samples so far. underruns : how often the buffer ran dry. bad : frames that were no packet.
+    held_ms : time spent at zero, waiting for the host, since sample 0. clock_us : its clock.
+    """
+
+    session: int
+    next_number: int
+    accept_samples: int
+    accept_events: int
+    received: int
+    played: int
+    state: State
+    flags: Flag
+    underruns: int
+    bad: int
+    held_ms: int
+    clock_us: int
+
+    _struct: ClassVar = struct.Struct("<IIQIQQBBIIIQ")
+
+    def packet(self) -> Packet:
+        """As bytes."""
+        values = (
+            self.session, self.next_number, self.accept_samples, self.accept_events, self.received, self.played,
+            self.state, self.flags, self.underruns, self.bad, self.held_ms, self.clock_us,
+        )  # fmt: skip
+        return Packet(Kind.ACK, 0, self._struct.pack(*values))
+
+    @classmethod
+    def of(cls, packet: Packet) -> Ack | None:
+        """From bytes; None when the state is not known."""
+        values = list(cls._struct.unpack(packet.payload))
+        if values[6] not in State.__members__.values():
+            return None
+        values[6], values[7] = State(values[6]), Flag(values[7] & Flag.GAP)
+        return cls(*values)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """The mark of `frame` went out as sample `at`, when the controller's clock read `clock_us`."""
+
+    frame: int
+    at: int
+    clock_us: int
+
+    _struct: ClassVar = struct.Struct("<IQQ")
+
+    def packet(self) -> Packet:
+        """As bytes."""
+        return Packet(Kind.MARKED, 0, self._struct.pack(self.frame, self.at, self.clock_us))
+
+    @classmethod
+    def of(cls, packet: Packet) -> Marked:
+        """From bytes."""
+        return cls(*cls._struct.unpack(packet.payload))
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The ordered packet `number` was whole but cannot be carried out; `why` is one line."""
+
+    number: int
+    why: str
+
+    def packet(self) -> Packet:
+        """As bytes."""
+        return Packet(Kind.REFUSED, 0, struct.pack("<I", self.number) + self.why.encode()[:200])
+
+    @classmethod
+    def of(cls, packet: Packet) -> Refused:
+        """From bytes."""
+        return cls(struct.unpack_from("<I", packet.payload)[0], packet.payload[4:].decode("utf-8", "replace"))

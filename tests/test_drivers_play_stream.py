@@ -1,0 +1,301 @@
+"""A written waveform over a pty to the emulator, in real time: what arrives is what the file says."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chainsim import Device, Outcome, load_device
+from drivers import read_waveform, write_waveform
+from drivers.emulator import LONGEST_STEP_S, Emulator
+from drivers.faults import Faults, Window
+from drivers.gate import GateLimits, pass_gate
+from drivers.messages import FULL_CODE
+from drivers.outgoing import session_messages
+from drivers.playout import ControllerSpec, OutputBlock
+from drivers.serial_play import NoAnswer, run_session
+from drivers.stream import HostSession, StreamReport, Timing
+from drivers.uart import PortUnavailable, Uart, serial_ports
+from encoders import Frame, TargetPattern
+from planner import ChainState, FramePlan, Margins, Plan, Ramp
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+
+SMOOTH = np.array([0.0, 0.5, 1.0])
+
+
+def dots(device: Device, seed: int) -> np.ndarray:
+    return (np.random.default_rng(seed).random((device.rows, device.cols)) < 0.5).astype(float)
+
+
+def plan_of(device: Device, frames: int, dwell_s: float) -> Plan:
+    """Random dots: biases where the device has them, else one tone a chain and links that glide."""
+
+    def states(number: int) -> list[ChainState]:
+        on = dots(device, number) * (number < frames)
+        biased = device.bias == "actuator"
+        n = device.chain_length
+        return [
+            ChainState(
+                target=part, epsilon=0j if biased else (0.05 + 0.02j) * (number < frames),
+                lam=np.full(n - 1, device.coupling.lam.max * (0.3 + 0.05 * number % 0.5)),
+                bias=0.13 * part if biased else np.zeros(n), omega=1.05, phasor=np.zeros(n, dtype=np.complex128),
+                mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,
+            )
+            for part in on.reshape(-1, n)
+        ]  # fmt: skip
+
+    def plans() -> Iterator[FramePlan]:
+        before, t_s = states(frames), np.array([0.0, 0.05, 0.1])
+        for number in range(frames + 1):
+            held = states(number)
+            ramps = tuple(
+                Ramp(
+                    t_s,
+                    epsilon=b.epsilon + (h.epsilon - b.epsilon) * SMOOTH,
+                    epsilon_slope=np.array([0, 10, 0]) * (h.epsilon - b.epsilon),
+                    bias=b.bias + (h.bias - b.bias) * SMOOTH[:, np.newaxis] if device.bias == "actuator" else None,
+                    lam_t_s=t_s[[0, 2]],
+                    lam=np.stack([b.lam, h.lam]),
+                )
+                for b, h in zip(before, held, strict=True)
+            )
+            frame = Frame(
+                TargetPattern(dots(device, number).astype(complex)), dwell_s, page=number, text=f"{number}", cells="⠁"
+            )
+            start_s = number * dwell_s
+            yield FramePlan(
+                frame if number < frames else None, start_s, start_s + 0.2, start_s + dwell_s, tuple(held), ramps
+            )
+            before = held
+
+    return Plan(device, plans(), {"kind": "test"})
+
+
+# A busy machine may stop either side for a while; that is not what most tests are about.
+PATIENT = {"buffer_s": 2.0, "watchdog_s": 2.0}
+STRICT = {"buffer_s": 0.5, "watchdog_s": 0.2}
+
+
+@contextmanager
+def emulated(device: Device, spec: dict[str, float] = PATIENT, **options: object) -> Iterator[Emulator]:
+    """An emulator that lives in a thread of its own."""
+    emulator = Emulator(device, ControllerSpec.of(device, **spec), **options)  # type: ignore[arg-type]
+    over = threading.Event()
+
+    def live() -> None:
+        while not over.is_set():
+            emulator.step(0.002)
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        yield emulator
+    finally:
+        over.set()
+        thread.join()
+        emulator.close()
+
+
+def play_to(port: str, path: Path, *, patience_s: float = 10.0) -> StreamReport:
+    manifest, reader = read_waveform(path)
+    limits = GateLimits.of(manifest.device, len(manifest.channels))
+    pass_gate(manifest, reader, limits)
+    session = HostSession(
+        lambda found: session_messages(manifest, reader, found, session=42, limits=limits), session=42, timing=Timing()
+    )
+    run_session(session, lambda: Uart(port), patience_s=patience_s)
+    return session.report
+
+
+def codes(path: Path) -> np.ndarray:
+    manifest, reader = read_waveform(path)
+    volts = np.concatenate(list(reader.blocks(8192)))
+    return np.rint(volts * (FULL_CODE / manifest.device.amplifier.volts)).astype(int)
+
+
+def check_arrived(sent: Path, arrived: Path) -> None:
+    """The record holds the samples, links and frames of what was sent, to the 16 bits of the line."""
+    np.testing.assert_array_equal(codes(arrived), codes(sent))
+    wanted, _ = read_waveform(sent)
+    found, reader = read_waveform(arrived)
+    found.check_digest(reader.path)
+    for mine, theirs in zip(wanted.frames, found.frames, strict=True):
+        np.testing.assert_array_equal(mine.target, theirs.target)
+        assert (mine.start_s, mine.text, mine.cells, mine.page) == (
+            theirs.start_s, theirs.text, theirs.cells, theirs.page,
+        )  # fmt: skip
+    assert wanted.encoding == found.encoding
+    t_s = np.linspace(0, wanted.duration_s, 500)
+    rough = 3 * 2 * np.pi / wanted.rate_hz + wanted.device.coupling.lam.max / 65535
+    np.testing.assert_allclose(found.lam_at(t_s), wanted.lam_at(t_s), atol=rough)
+
+
+@pytest.mark.parametrize("name", ["paper-6x6", "linked-6x6", "independent-6x6"])
+def test_what_arrives_is_what_was_written(tmp_path: Path, name: str) -> None:
+    device = load_device(name)
+    sent, arrived = tmp_path / "sent.wav", tmp_path / "arrived.wav"
+    write_waveform(plan_of(device, 3, 0.25), sent)
+    with emulated(device, record=arrived) as emulator:
+        report = play_to(emulator.port, sent)
+    check_arrived(sent, arrived)
+    assert report.underruns == 0
+    assert report.lost_s == 0
+    assert report.late_s.keys() == {0, 1, 2}
+
+
+def test_a_bad_line_and_a_pulled_cable(tmp_path: Path) -> None:
+    device = load_device("paper-6x6")
+    sent, arrived, link = tmp_path / "sent.wav", tmp_path / "arrived.wav", tmp_path / "port"
+    write_waveform(plan_of(device, 5, 0.4), sent)
+    faults = Faults(drop=0.01, corrupt=0.01, disconnect=Window(0.8, 0.7))
+    with emulated(device, STRICT, record=arrived, link=link, faults=faults) as emulator:
+        report = play_to(str(link), sent)
+        assert emulator.status().mischief > 0
+    check_arrived(sent, arrived)
+    assert report.reconnects >= 1
+    assert report.lost_s > 0.4
+    assert not link.exists()
+
+
+def test_the_cable_stays_out(tmp_path: Path) -> None:
+    device = load_device("independent-6x6")
+    sent, link = tmp_path / "sent.wav", tmp_path / "port"
+    write_waveform(plan_of(device, 3, 0.25), sent)
+    blocks: list[OutputBlock] = []
+    cut = Faults(disconnect=Window(0.6, 99.0))
+    with (
+        emulated(device, STRICT, link=link, faults=cut, on_output=blocks.append),
+        pytest.raises(NoAnswer, match="check port and cable"),
+    ):
+        play_to(str(link), sent, patience_s=0.5)
+    assert any(block.volts.any() for block in blocks)
+    assert not blocks[-1].volts.any()
+
+
+def test_no_port_a_wrong_port_and_a_port_in_use(tmp_path: Path) -> None:
+    with pytest.raises(PortUnavailable, match="there is no such port; `dotwave ports`"):
+        Uart(str(tmp_path / "nothing"))
+    with emulated(load_device("independent-6x6")) as emulator:
+        first = Uart(emulator.port)
+        with pytest.raises(PortUnavailable, match="another program is using it"):
+            Uart(emulator.port)
+        first.close()
+        Uart(emulator.port).close()
+    assert isinstance(serial_ports(), list)
+
+
+def test_nobody_answers(tmp_path: Path) -> None:
+    sent = tmp_path / "sent.wav"
+    write_waveform(plan_of(load_device("independent-6x6"), 1, 0.4), sent)
+    master, slave = os.openpty()
+    try:
+        with pytest.raises(NoAnswer, match="nothing was heard"):
+            play_to(os.ttyname(slave), sent, patience_s=0.3)
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+HOST = """
+import sys
+from drivers import read_waveform
+from drivers.gate import GateLimits
+from drivers.outgoing import session_messages
+from drivers.serial_play import run_session
+from drivers.stream import HostSession, Timing
+from drivers.uart import Uart
+
+manifest, reader = read_waveform(sys.argv[2])
+limits = GateLimits.of(manifest.device, len(manifest.channels))
+make = lambda found: session_messages(manifest, reader, found, session=9, limits=limits)
+session = HostSession(make, session=9, timing=Timing())
+run_session(session, lambda: Uart(sys.argv[1]), patience_s=5.0)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["kill -9", "Ctrl-C"])
+def test_a_host_that_dies_leaves_the_output_at_zero(tmp_path: Path, number: int) -> None:
+    device = load_device("paper-6x6")
+    sent = tmp_path / "sent.wav"
+    write_waveform(plan_of(device, 8, 0.5), sent)
+    spec = ControllerSpec.of(device, **STRICT)
+    blocks: list[OutputBlock] = []
+    emulator = Emulator(device, spec, on_output=blocks.append)
+    host = subprocess.Popen([sys.executable, "-c", HOST, emulator.port, sent], stderr=subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + 30
+        while emulator.status().played_s < 0.7:
+            assert time.monotonic() < deadline
+            emulator.step(0.002)
+        host.send_signal(number)
+        killed = emulator.now
+        host.wait(10)
+        while emulator.now < killed + 0.6:
+            emulator.step(0.002)
+    finally:
+        host.kill()
+        host.wait(10)
+        emulator.close()
+    volts = np.concatenate([np.abs(block.volts).max(axis=1) for block in blocks])
+    at = np.concatenate([block.time_s + np.arange(len(block.volts)) / spec.true_rate_hz for block in blocks])
+    assert volts[at < killed].max() > 10
+    # Bytes sent before the signal may be heard one step after it.
+    assert not volts[at > killed + spec.watchdog_s + LONGEST_STEP_S].any()
+    # Down along the ramp: no sample falls by more than a ramp's step, or a step of the waveform itself.
+    falling = -np.diff(volts[at >= killed])
+    assert falling.max() <= 1.1 * device.amplifier.volts / (spec.ramp_s * spec.rate_hz)
+
+
+def test_verify_works_on_what_arrived(tmp_path: Path) -> None:
+    from dotwave.verify import verify
+    from encoders import GridShape, TextOptions, TextSource, encode_text
+    from planner import plan_scene
+
+    device = load_device("paper-6x6")
+    sent, arrived = tmp_path / "sent.wav", tmp_path / "arrived.wav"
+    scene = encode_text(TextSource.of_text("Hi you"), GridShape(6, 6), TextOptions(dwell_s=0.4))
+    write_waveform(plan_scene(scene, device), sent)
+    with emulated(device, record=arrived, faults=Faults(drop=0.01, corrupt=0.01)) as emulator:
+        play_to(emulator.port, sent)
+    before, after = verify(sent), verify(arrived)
+    assert after.ok
+    assert after.felt_text == before.felt_text
+    for wanted, found in zip(before.frames, after.frames, strict=True):
+        np.testing.assert_allclose(found.felt, wanted.felt, atol=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seconds", "faults"),
+    [(60.0, Faults()), (10.0, Faults(drop=0.01, corrupt=0.01, disconnect=Window(4.0, 2.0)))],
+    ids=["clean", "bad"],
+)
+def test_a_minute_of_42_channels(tmp_path: Path, seconds: float, faults: Faults) -> None:
+    device = load_device("paper-6x6")
+    sent, arrived, link = tmp_path / "sent.wav", tmp_path / "arrived.wav", tmp_path / "port"
+    frames = round(seconds / 0.6)
+    write_waveform(plan_of(device, frames, 0.6), sent)
+    with emulated(device, STRICT, record=arrived, link=link, faults=faults) as emulator:
+        report = play_to(str(link), sent)
+        slipped_s = emulator.status().slipped_s
+    check_arrived(sent, arrived)
+    assert report.samples >= 8000 * seconds
+    if faults == Faults():
+        assert (report.underruns, report.lost_s) == (0, 0.0)
+        assert max(map(abs, report.late_s.values())) <= 0.001
+        # Time the emulator itself was kept from running would not pass on a real controller.
+        assert max(map(abs, report.reported_late_s.values())) <= 0.02 + slipped_s
+        assert len(report.late_s) == frames
+    else:
+        assert report.lost_s > 1.4
