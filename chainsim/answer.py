@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from .basis import Basis, basis_for
 from .floquet import chain_multipliers
+from .joint import correct_joint, rounding_of
 from .march import correct
+from .monodromy import joint_multipliers
 from .response import Outcome, Response, Stats
 from .scaling import Stages
 
@@ -64,16 +66,17 @@ def defect(stages: Stages, basis: Basis, x: Floats) -> Floats:
     x has shape (n, d, N); the result is float64, shape (N,), relative to the setting's largest amplitude, and inf
     where the step is not finite.
     """
-    if not stages.sign and basis.order:
+    if stages.linear and basis.order and not stages.joint:
         return _floor(stages)
     sharper = finer(basis)
-    moved = correct(stages, sharper, x, basis)
+    moved = (correct_joint if stages.joint else correct)(stages, sharper, x, basis)
     mine, other = _shared(basis, sharper)
     size = np.abs(moved).max(axis=(0, 1))
     away = np.abs(moved[:, other] - x[:, mine]).max(axis=(0, 1))
     if not basis.order:
         away = np.maximum(away, np.abs(moved[:, :2]).max(axis=(0, 1)))
-    relative = np.where(away == 0, 0.0, SAFETY * away / size) + _floor(stages)
+    relative = np.where(away == 0, 0.0, SAFETY * away / size)
+    relative = relative + (rounding_of(stages, basis, x) if stages.joint else _floor(stages))
     return np.where(np.isfinite(relative), relative, np.inf)
 
 
@@ -85,7 +88,8 @@ def _shared(basis: Basis, sharper: Basis) -> tuple[list[int], list[int]]:
 
 
 def _floor(stages: Stages) -> Floats:
-    return ROUNDING * (1 + 1 / np.maximum(stages.delta * stages.omega, 1e-12))
+    floor: Floats = ROUNDING * (1 + 1 / np.maximum(stages.delta.min() * stages.omega, 1e-12))
+    return floor
 
 
 def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: float) -> Response:
@@ -96,7 +100,8 @@ def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: f
     solved = (answer.outcome == Outcome.OK) | (answer.outcome == Outcome.OUT_OF_BUDGET)
     multipliers = answer.multipliers
     if multipliers is None:
-        multipliers = chain_multipliers(stages, answer.basis, np.where(solved, answer.x, np.nan))
+        known_only = np.where(solved, answer.x, np.nan)
+        multipliers = (joint_multipliers if stages.joint else chain_multipliers)(stages, answer.basis, known_only)
     stable = solved & (np.abs(multipliers) < 1).all(axis=(1, 2))
     known = np.isfinite(multipliers).all(axis=(1, 2))
     outcome = answer.outcome.copy()

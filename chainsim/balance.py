@@ -26,19 +26,20 @@ LAPACK_BELOW = 48
 
 @dataclass(frozen=True)
 class Oscillator:
-    """One oscillator of the chain for every setting of a batch, scaled.
+    """One oscillator of the chain for every setting of a batch, or several side by side, scaled.
 
-    omega, k : float64, shape (N,).
+    omega, k : float64, shape (N,). delta, sign : the same, or shape (1,).
     """
 
     omega: Floats
     k: Floats
-    delta: float
-    sign: float
+    delta: Floats
+    sign: Floats
 
     def pick(self, index: NDArray[np.intp] | Bools) -> Oscillator:
         """The oscillator at some settings."""
-        return Oscillator(self.omega[index], self.k[index], self.delta, self.sign)
+        delta, sign = (value if len(value) == 1 else value[index] for value in (self.delta, self.sign))
+        return Oscillator(self.omega[index], self.k[index], delta, sign)
 
     def coefficients(self, basis: Basis) -> Floats:
         """Work array for `linearise`: room for z^2, then k, omega^2 and delta omega."""
@@ -58,7 +59,7 @@ class Solved:
     steps: int
 
 
-def linearise(basis: Basis, columns: Floats, sign: float, x: Floats) -> tuple[Floats, Floats]:
+def linearise(basis: Basis, columns: Floats, sign: Floats, x: Floats) -> tuple[Floats, Floats]:
     """Jacobian, shape (d, d, N), of the balance equations R(x) = 0 at x, and its product with x less R and force.
 
     The cubic term c(x) is homogeneous, so J x = L x + 3 c(x), and Newton's next x solves

@@ -29,70 +29,83 @@ def all_branches(stages: Stages, basis: Basis) -> March:
     RungError
         When there are more than 2048.
     """
-    paths: list[list[Floats]] = [[]]
-    labels: list[list[int]] = [[]]
+    x, branch = np.empty((0, basis.size, 1)), np.empty((0, 1), dtype=np.int8)
     steps = 0
     for m in range(stages.n):
-        osc, grown, named = oscillator(stages, m), [], []
-        for path, label in zip(paths, labels, strict=True):
-            before = path[-1][:, None] if path else None
-            found, work = _answers(osc, basis, push(stages, basis, m, before))
-            steps += work
-            ranks = (0, 2) if len(found) == 2 else range(len(found))
-            grown += [[*path, x] for x in found]
-            named += [[*label, rank] for rank in ranks]
-        paths, labels = grown, named
-        if len(paths) > MAX_BRANCHES:
+        paths = stages.pick(np.zeros(x.shape[2], dtype=np.intp))
+        above = x[m + stages.stride] if m >= -stages.stride > 0 else None
+        force = push(paths, basis, m, x[m - 1] if m else None, above)
+        found, path, work = _answers(oscillator(stages, m), basis, force)
+        steps += work
+        if len(path) > MAX_BRANCHES:
             raise RungError(f"more than {MAX_BRANCHES} branches by oscillator {m}; use start rest, or a shorter chain")
-    shape = (stages.n, basis.size, len(paths))
-    x = np.array(paths).transpose(1, 2, 0) if paths else np.empty(shape)
-    branch = np.array(labels, dtype=np.int8).reshape(len(paths), stages.n).T
-    return March(basis, x, np.ones(len(paths), dtype=bool), branch, steps)
+        x = np.concatenate([x[:, :, path], found[None]])
+        branch = np.concatenate([branch[:, path], _ranks(path)[None]])
+    return March(basis, x, np.ones(x.shape[2], dtype=bool), branch, steps)
 
 
-def _answers(osc: Oscillator, basis: Basis, force: Floats) -> tuple[list[Floats], int]:
-    """The distinct answers of one oscillator under `force` (d, 1), by size, and the Newton steps spent."""
-    starts = _starts(osc, basis, force)
-    many = osc.pick(np.zeros(starts.shape[1], dtype=np.intp))
-    solved = newton(basis, many, np.repeat(force, starts.shape[1], axis=1), starts)
-    found: list[Floats] = []
-    for x in solved.x[:, solved.ok].T:
-        if all(np.abs(x - other).max() > SAME * np.abs(x).max() for other in found):
-            found.append(x)
-    by_size = sorted(found, key=lambda x: float(np.hypot(x[0], x[1]) if basis.order else abs(x[0])))
-    return by_size, solved.steps
+def _ranks(path: NDArray[np.intp]) -> NDArray[np.int8]:
+    """Low, middle, high of the answers of each path, which stand one after the other; low and high of two."""
+    count = np.bincount(path)[path] if len(path) else path
+    rank = np.arange(len(path)) - np.searchsorted(path, path)
+    return np.where((count == 2) & (rank == 1), 2, rank).astype(np.int8)
 
 
-def _starts(osc: Oscillator, basis: Basis, force: Floats) -> Floats:
-    """Starts for Newton, shape (d, J): the single-harmonic roots and the folds between them; a fold leads to the
-    answer beside it when the true fold lies elsewhere.
+def _answers(osc: Oscillator, basis: Basis, force: Floats) -> tuple[Floats, NDArray[np.intp], int]:
+    """The distinct answers (d, B) of one oscillator under each `force` (d, P) by size, whose they are, the steps."""
+    many = osc.pick(np.zeros(force.shape[1], dtype=np.intp))
+    starts, path = _starts(many, basis, force)
+    solved = newton(basis, many.pick(path), force[:, path], starts)
+    x, path = solved.x[:, solved.ok], path[solved.ok]
+    size = np.hypot(x[0], x[1]) if basis.order else np.abs(x[0])
+    order = np.lexsort((size, path))
+    x, path = x[:, order], path[order]
+    new = np.ones(len(path), dtype=bool)
+    # Answers of one size may differ in phase, so each is held against all of its path before it: at most four.
+    for back in range(1, 5):
+        twin = (path[back:] == path[:-back]) & (
+            np.abs(x[:, back:] - x[:, :-back]).max(axis=0) <= SAME * np.abs(x[:, back:]).max(axis=0)
+        )
+        new[back:] &= ~twin
+    return x[:, new], path[new], solved.steps
+
+
+def _starts(osc: Oscillator, basis: Basis, force: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Starts for Newton, shape (d, J), and which force each belongs to.
+
+    They are the single-harmonic roots and the folds between them; a fold leads to the answer beside it when the true
+    fold lies elsewhere.
     """
     if not basis.order:
-        return np.array([_rest_points(osc, float(force[-1, 0]))])
+        points = [_rest_points(osc, float(constant)) for constant in force[-1]]
+        return np.concatenate(points)[None], np.repeat(np.arange(len(points)), [len(each) for each in points])
     drive = first_phasor(force)
     kappa, g = osc.k - osc.omega**2, osc.delta * osc.omega
-    means = np.zeros(1)
-    if not osc.sign:
-        phasors = drive / (kappa + 1j * g)
-    elif basis.mean and force[-1, 0]:
-        pairs = mean_starts(kappa, g, osc.k, osc.sign, drive, force[-1])
-        phasors, means = pairs[0][:, 0], pairs[1][:, 0]
+    means = np.zeros((1, len(drive)))
+    if not osc.sign.any():
+        phasors = (drive / (kappa + 1j * g))[None]
+        if basis.mean:
+            means = (force[-1] / osc.k)[None]
+    elif basis.mean and force[-1].any():
+        phasors, means = mean_starts(kappa, g, osc.k, osc.sign, drive, force[-1])
     else:
         cubic = cubic_of(osc, drive)
         roots = [cubic.lowest(), cubic.middle(), cubic.highest()]
         folds = [np.where(cubic.folded, v, np.nan) for v in (cubic.peak, cubic.dip)]
-        phasors = np.concatenate([cubic.amplitude(v, drive) for v in (*roots, *folds)])
-    kept = np.isfinite(phasors)
-    starts = np.zeros((basis.size, int(kept.sum())))
-    starts[0], starts[1] = phasors[kept].real, phasors[kept].imag
+        phasors = np.stack([cubic.amplitude(v, drive) for v in (*roots, *folds)])
+    which, path = np.nonzero(np.isfinite(phasors))
+    starts = np.zeros((basis.size, len(path)))
+    chosen = phasors[which, path]
+    starts[0], starts[1] = chosen.real, chosen.imag
     if basis.mean:
-        starts[-1] = np.broadcast_to(means, phasors.shape)[kept]
-    return starts
+        starts[-1] = np.broadcast_to(means, phasors.shape)[which, path]
+    return starts, path
 
 
 def _rest_points(osc: Oscillator, constant: float) -> Floats:
     """Real roots of ``sign c^3 + k c = constant``."""
     k = float(osc.k[0])
-    roots = np.roots([osc.sign, 0.0, k, -constant]) if osc.sign else np.array([constant / k])
+    sign = float(osc.sign[0])
+    roots = np.roots([sign, 0.0, k, -constant]) if sign else np.array([constant / k])
     real: Floats = np.real(roots[np.abs(np.imag(roots)) <= 1e-7 * (1 + np.abs(roots))])
     return real

@@ -7,8 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from .calibrated import Actuator, misplaced
 from .chain import Chain, Closure
 from .errors import ProfileError
 from .yamlfile import read_model
@@ -21,6 +24,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=1024)]
+Bits = Annotated[int, Field(ge=1, le=32)]
 
 
 class _Part(BaseModel):
@@ -44,26 +48,46 @@ class Coupling(_Part):
     """How actuators of a chain are coupled.
 
     `scope` is what one lam belongs to: every link has its own (`link`), one for a chain (`chain`), one
-    for the whole device (`device`), or the actuators are not coupled (`none`).
+    for the whole device (`device`), one that was built in and cannot be set (`fixed`), or the actuators are
+    not coupled (`none`). With `bits`, lam can be set to 2^bits values from lam.min to lam.max; None is any.
     """
 
     closure: Closure = Closure.OPEN
-    scope: Literal["none", "device", "chain", "link"]
+    scope: Literal["none", "fixed", "device", "chain", "link"]
     lam: Span = Span(min=0.0, max=0.0)
+    bits: Bits | None = None
 
     @model_validator(mode="after")
-    def _uncoupled_has_no_lam(self) -> Coupling:
+    def _consistent(self) -> Coupling:
+        if self.closure is Closure.BIDIRECTIONAL:
+            raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
         if self.scope == "none" and self.lam.max > 0:
             raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
+        if self.scope == "fixed" and self.lam.min != self.lam.max:
+            raise ValueError(f"scope fixed has one lam, got {self.lam.min} to {self.lam.max}; make min and max equal")
         return self
+
+    @property
+    def lam_step(self) -> float:
+        """From one lam that can be set to the next; 0 where any can."""
+        return 0.0 if self.bits is None else (self.lam.max - self.lam.min) / (2**self.bits - 1)
 
 
 class Amplifier(_Part):
-    """What every output channel can do."""
+    """What every output channel can do.
+
+    With `bits`, its converter makes 2^bits - 1 voltages from -volts to volts, 0 among them; None is any.
+    """
 
     volts: Positive
     slew_v_per_s: Positive
     rate_hz: Annotated[int, Field(ge=100, le=10_000_000)]
+    bits: Annotated[int, Field(ge=2, le=32)] | None = None
+
+    @property
+    def volt_step(self) -> float:
+        """From one voltage to the next; 0 where any can be made."""
+        return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
 class Note(_Part):
@@ -89,7 +113,9 @@ class Device(_Part):
     full_scale : dimensionless amplitude of target 1.
     epsilon_per_volt, bias_per_volt : dimensionless force per volt at the actuator (drive, bias).
     omega : drive frequencies the device can make, over f0.
+    drive : whether every chain has its own drive, or all chains are driven alike (`device`).
     bias : whether every actuator has its own DC bias channel.
+    actuators : what was measured of single actuators (`dotwave calibrate`).
     notes : field name -> where the value comes from.
     """
 
@@ -109,8 +135,10 @@ class Device(_Part):
     bias_per_volt: Positive
     omega: Span
     coupling: Coupling
+    drive: Literal["chain", "device"] = "chain"
     bias: Literal["none", "actuator"]
     amplifier: Amplifier
+    actuators: tuple[Actuator, ...] = ()
     notes: dict[str, Note] = {}
 
     @model_validator(mode="after")
@@ -121,6 +149,9 @@ class Device(_Part):
             raise ValueError("omega.min must be above 0")
         if self.coupling.scope == "none" and self.chain_length > 1:
             raise ValueError("coupling.scope none needs chain_length 1")
+        wrong = misplaced(self.actuators, self.rows, self.cols, self.chain_length)
+        if wrong:
+            raise ValueError(wrong)
         unknown = sorted(set(self.notes) - set(type(self).model_fields))
         if unknown:
             raise ValueError(f"notes.{unknown[0]}: the profile has no such field")
@@ -139,6 +170,36 @@ class Device(_Part):
     def chain(self) -> Chain:
         """One chain of the device, for the solvers."""
         return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure)
+
+    def chain_at(self, row: int, index: int = 0) -> Chain:
+        """Chain `index` of `row` (both from 0) with the numbers of its actuators."""
+        measured = self._measured(row, index)
+        return Chain.of(
+            self.chain_length,
+            delta=[self.delta if one is None or one.delta is None else one.delta for one in measured],
+            beta=[self.beta if one is None or one.beta is None else one.beta for one in measured],
+            stiffness=[1.0 if one is None or one.f0_hz is None else (one.f0_hz / self.f0_hz) ** 2 for one in measured],
+            closure=self.coupling.closure,
+        )
+
+    def lam_gain(self, row: int, index: int = 0) -> NDArray[np.float64]:
+        """What the links of a chain make of the lam they are set to; float64, shape (n-1,), 1 where not measured."""
+        return np.array(
+            [
+                1.0 if one is None or one.lam is None or one.lam_set is None else one.lam / one.lam_set
+                for one in self._measured(row, index)[1:]
+            ]
+        )
+
+    def drive_per_volt(self, row: int, index: int = 0) -> float:
+        """Dimensionless force per volt on the first actuator of a chain."""
+        first = self._measured(row, index)[0]
+        return self.epsilon_per_volt if first is None or first.epsilon_per_volt is None else first.epsilon_per_volt
+
+    def _measured(self, row: int, index: int) -> list[Actuator | None]:
+        known = {(one.row, one.col): one for one in self.actuators}
+        start = index * self.chain_length
+        return [known.get((row, col)) for col in range(start, start + self.chain_length)]
 
     @property
     def escape_amplitude(self) -> float:

@@ -27,6 +27,10 @@ NODES = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])
 # Agreement of the half-trace between two step sizes. Extrapolating both (the error falls 64 times) leaves about 1/50.
 AGREEMENT = 1e-7
 MAX_STEPS = 8192
+# Swings of an oscillator during half a turn of the drive, from which on the drive counts as slow.
+SLOWEST = 1000.0
+TALLEST = 300.0
+WKB_POINTS = 512
 # cosh(r) and sinh(r)/r in powers of r^2; at |r^2| <= 1 the first term left out is under 2e-16.
 EVEN = tuple(1 / math.factorial(2 * k) for k in range(9))
 ODD = tuple(1 / math.factorial(2 * k + 1) for k in range(9))
@@ -37,17 +41,17 @@ CHUNK = 8_000
 
 @dataclass(frozen=True)
 class _Hill:
-    """M Hill equations over one angle: base, scale and omega of shape (M,), x of shape (d, M)."""
+    """M Hill equations over one angle: base, sign and omega of shape (M,), x of shape (d, M)."""
 
     basis: Basis
     span: float
     base: Floats
-    sign: float
+    sign: Floats
     omega: Floats
     x: Floats
 
     def pick(self, index: NDArray[np.intp]) -> _Hill:
-        return _Hill(self.basis, self.span, self.base[index], self.sign, self.omega[index], self.x[:, index])
+        return _Hill(self.basis, self.span, self.base[index], self.sign[index], self.omega[index], self.x[:, index])
 
 
 def chain_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
@@ -64,13 +68,17 @@ def chain_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
     n, size = stages.n, len(stages)
     flat = np.ascontiguousarray(x.transpose(1, 0, 2)).reshape(basis.size, -1)
     omega = np.broadcast_to(stages.omega, (n, size)).reshape(-1)
-    base = stages.k.reshape(-1) - 0.25 * stages.delta**2
+    base = (stages.k - 0.25 * stages.delta**2).reshape(-1)
     # An odd series has z^2 of half the period: the monodromy is the square of that of half a turn.
     halves = 1 if basis.mean else 2
-    hill = _Hill(basis, 2 * np.pi / halves, base, stages.sign, omega, flat)
-    half_trace = _half_trace(hill)
+    delta, sign = (np.repeat(stages.of_each(value), size) for value in (stages.delta, stages.sign))
+    hill = _Hill(basis, 2 * np.pi / halves, base, sign, omega, flat)
+    half_trace, slow = _half_trace(hill)
     pair = _pair(half_trace) ** halves
-    pair = pair * np.exp(-np.pi * stages.delta / omega)
+    pair = pair * np.exp(-np.pi * delta / omega)
+    if slow.any():
+        lanes = np.flatnonzero(slow)
+        pair[:, lanes] = _slow_pair(hill.pick(lanes), delta[lanes])
     return pair.T.reshape(n, size, 2).transpose(1, 0, 2)
 
 
@@ -81,18 +89,39 @@ def _pair(t: Floats) -> Complexes:
     return np.stack([large, 1 / large])
 
 
-def _half_trace(hill: _Hill) -> Floats:
-    """Half the trace of every monodromy; NaN where two step sizes never agree. Each lane has its own step size."""
+def _half_trace(hill: _Hill) -> tuple[Floats, NDArray[np.bool_]]:
+    """Half the trace of every monodromy, NaN where two step sizes never agree; and which oscillators are too fast."""
     answer = np.full(len(hill.base), np.nan)
     turns = np.sqrt(np.abs(hill.base)) / hill.omega
     fastest = np.maximum(turns, max(0.5 * hill.basis.order, 1.0)) * (hill.span / np.pi)
-    known = np.isfinite(hill.x).all(axis=0) & (fastest <= MAX_STEPS)
+    finite = np.isfinite(hill.x).all(axis=0)
+    # Without swings the half trace grows like cosh and would overflow.
+    known = finite & (fastest <= SLOWEST) & ~((hill.base < 0) & (turns * hill.span > TALLEST))
     levels = 4 * 2 ** np.ceil(np.log2(np.where(known, fastest, 1.0))).astype(np.intp)
     for steps in np.unique(levels[known]):
-        if steps < MAX_STEPS:
-            lanes = np.flatnonzero(known & (levels == steps))
-            answer[lanes] = _refined(hill.pick(lanes), int(steps))
-    return answer
+        lanes = np.flatnonzero(known & (levels == steps))
+        answer[lanes] = _refined(hill.pick(lanes), int(steps))
+    return answer, finite & ~known & np.isfinite(fastest)
+
+
+def _slow_pair(hill: _Hill, delta: Floats) -> Complexes:
+    """Multipliers (2, M) of oscillators far faster than the drive: ``exp(int of both momentary exponents)``.
+
+    The first correction is of order 1 over the square of the swings. NaN where an oscillator is now under-, now
+    overdamped: there the exponents meet.
+    """
+    z = hill.basis.evaluate_at(2 * np.pi * (np.arange(WKB_POINTS) + 0.5) / WKB_POINTS) @ hill.x
+    q = hill.base + 3 * hill.sign * z * z
+    root = np.sqrt(np.abs(q))
+    decay = 0.5 * delta + root
+    period = 2 * np.pi / hill.omega
+    # -delta/2 + root without its cancellation: their product is the stiffness.
+    over = np.stack([-((q + 0.25 * delta**2) / decay).mean(axis=0), -decay.mean(axis=0)]) + 0j
+    swing = 1j * root.mean(axis=0)
+    under = np.stack([swing - 0.5 * delta, -swing - 0.5 * delta])
+    exponents = np.where((q < 0).all(axis=0), over, np.where((q > 0).all(axis=0), under, complex(np.nan, np.nan)))
+    pair: Complexes = np.exp(exponents * period)
+    return pair
 
 
 def _refined(hill: _Hill, steps: int) -> Floats:

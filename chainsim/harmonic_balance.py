@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .answer import ORDERS, Answer, defect, finer, outcomes, response_of, stitch
-from .basis import basis_for, resize
+from .basis import Basis, basis_for, resize
 from .branches import all_branches
-from .chain import Chain, Closure, Setting
+from .chain import Chain, Setting
+from .joint import follow_load, newton_joint
 from .march import March, march, means_under, past_fold
 from .response import Outcome, Response, Stats
 from .rung import Rung, Start
 from .scaling import Stages
 
-__all__ = ["HarmonicBalanceRung", "balance_near", "open_refusal"]
+__all__ = ["HarmonicBalanceRung", "balance_near", "branch_refusal", "lower_branch"]
 
 Floats = NDArray[np.float64]
 
@@ -26,15 +27,18 @@ LAST = ORDERS[-2]
 
 
 class HarmonicBalanceRung(Rung):
-    """Odd harmonics (all and the mean under a constant force) of each oscillator in turn, by Newton's method."""
+    """Odd harmonics (all and the mean under a constant force), by Newton's method.
+
+    Each oscillator in turn, or all at once where they act on each other.
+    """
 
     name = "harmonic_balance"
     order = "geometric in the number of harmonics; with 1 and 3 alone O(beta^2 a^4)"
-    valid = "any response locked to the drive, in an open chain"
+    valid = "any response locked to the drive"
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
-        """Open chains only; every branch only of one setting."""
-        return open_refusal(chain, setting, start)
+        """Every branch only of one setting, and only where oscillators can be solved in turn."""
+        return branch_refusal(chain, setting, start)
 
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
         """The lower branch (rest, ramp) or every branch (all); for a ramp it must join the branch that starts at 0."""
@@ -44,19 +48,28 @@ class HarmonicBalanceRung(Rung):
         if start is Start.ALL:
             found = all_branches(stages, basis)
             return _refined(stages.pick(np.zeros(len(found.ok), dtype=np.intp)), tol, found, began)
-        found = march(stages, basis)
-        if start is Start.RAMP:
-            found = replace(found, ok=found.ok & ~past_fold(stages, found.basis, found.x))
-        return _refined(stages, tol, found, began)
+        return _refined(stages, tol, lower_branch(stages, basis, start), began)
 
 
-def open_refusal(chain: Chain, setting: Setting, start: Start) -> str:
-    """Why a rung that goes oscillator by oscillator cannot answer, or ""."""
-    if chain.closure is Closure.RING:
-        return "a ring is not solved oscillator by oscillator; use rung ode or auto"
-    if start is Start.ALL and len(setting) != 1:
-        return f"start all takes one setting, got {len(setting)}"
-    return ""
+def branch_refusal(chain: Chain, setting: Setting, start: Start) -> str:
+    """Why a steady rung cannot answer, or ""."""
+    if start is not Start.ALL:
+        return ""
+    if not chain.feed_forward:
+        return f"the branches of a {chain.closure} chain cannot be counted one by one; use start rest or ramp"
+    return f"start all takes one setting, got {len(setting)}" if len(setting) != 1 else ""
+
+
+def lower_branch(stages: Stages, basis: Basis, start: Start) -> March:
+    """The lower branch; for a ramp it must join the one that starts at 0. Joint oscillators are always followed."""
+    if stages.joint:
+        return follow_load(stages, basis)
+    found = march(stages, basis)
+    return replace(found, ok=found.ok & ~past_fold(stages, basis, found.x)) if start is Start.RAMP else found
+
+
+def _solved(stages: Stages, basis: Basis, guide: Floats) -> March:
+    return newton_joint(stages, basis, guide) if stages.joint else march(stages, basis, guide)
 
 
 def balance_near(chain: Chain, setting: Setting, phasor: NDArray[np.complex128], *, tol: float) -> Response:
@@ -76,7 +89,7 @@ def balance_near(chain: Chain, setting: Setting, phasor: NDArray[np.complex128],
         with np.errstate(all="ignore"):
             guide[:, -1] = means_under(stages, scaled)
     with np.errstate(all="ignore"):
-        return _refined(stages, tol, march(stages, basis, guide), began)
+        return _refined(stages, tol, _solved(stages, basis, guide), began)
 
 
 def _refined(stages: Stages, tol: float, first: March, began: float) -> Response:
@@ -95,7 +108,7 @@ def _refined(stages: Stages, tol: float, first: March, began: float) -> Response
         todo, here = todo[left], here.pick(left)
         basis = finer(found.basis)
         guide = np.stack([resize(x, found.basis, basis) for x in found.x[:, :, left]])
-        found = replace(march(here, basis, guide), branch=found.branch[:, left])
+        found = replace(_solved(here, basis, guide), branch=found.branch[:, left])
         steps += found.steps
     whole = parts[0][1] if len(parts) == 1 else stitch(HarmonicBalanceRung.name, len(stages), parts)
     work = Stats(newton_steps=steps, oscillators_solved=stages.n * len(stages), seconds=time.perf_counter() - began)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .answer import Answer, response_of, stitch
 from .basis import basis_for
-from .chain import Chain, Closure, Setting
+from .chain import Chain, Setting
 from .harmonic_balance import balance_near
 from .response import Outcome, Response, Stats
 from .rest import sure_from_rest
@@ -53,10 +53,8 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
     if rung != "auto":
         return load_rung(rung).solve(chain, setting, tol=tol, start=way)
-    if not chain.beta:
+    if not chain.betas.any():
         return _linear(chain, setting, tol, way)
-    if chain.closure is Closure.RING:
-        return load_rung("ode").solve(chain, setting, tol=tol, start=way)
     if way is Start.ALL:
         name = "harmonic_balance" if setting.epsilon.any() else "static"
         return load_rung(name).solve(chain, setting, tol=tol, start=way)
@@ -66,7 +64,7 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
 
 def _linear(chain: Chain, setting: Setting, tol: float, start: Start) -> Response:
     response = load_rung("linear").solve(chain, setting, tol=tol, start=start)
-    if chain.delta or start is not Start.REST:
+    if chain.deltas.all() or start is not Start.REST:
         return response
     outcome = response.outcome.copy()
     # Without damping the start-up transient never dies out.
@@ -87,14 +85,20 @@ def _cheapest(chain: Chain, setting: Setting, tol: float, start: Start) -> Respo
 
 
 def _candidates(chain: Chain, setting: Setting, tol: float) -> tuple[str, ...]:
-    """Rungs worth a try, cheapest first; the cubic's share at the first oscillator says if linear can be one."""
+    """Rungs worth a try, cheapest first: the share of the cubic term at the first oscillator says which could do.
+
+    The third harmonic, slaved to the first, is beta a^2/32 of it, and acts back by that much of the cubic term's share.
+    """
     if not setting.epsilon.any():
         return ("static",)
     with np.errstate(all="ignore"):
-        impedance = 1 - setting.omega**2 + 1j * chain.delta * setting.omega
-        share = 0.75 * abs(chain.beta) * np.abs(setting.epsilon / impedance) ** 2 / np.abs(impedance)
-    steady = ("one_harmonic", "harmonic_balance")
-    return ("linear", *steady) if bool((share <= tol).all()) else steady
+        impedance = chain.stiffness[0] - setting.omega**2 + 1j * chain.deltas[0] * setting.omega
+        square = np.abs(chain.betas).max() * np.abs(setting.epsilon / impedance) ** 2
+        share = 0.75 * square / np.abs(impedance)
+        hopeless = bool((share * square / 32 > 10 * tol).any())
+    if bool((share <= tol).all()):
+        return ("linear", "one_harmonic", "harmonic_balance")
+    return ("harmonic_balance",) if hopeless else ("one_harmonic", "harmonic_balance")
 
 
 def _from_rest(chain: Chain, setting: Setting, tol: float, steady: Response) -> Response:

@@ -1,4 +1,4 @@
-"""Along an open chain, oscillator by oscillator: each is driven by the series of the one before."""
+"""Along an open chain or grid, layer by layer: each oscillator is driven by the series of those before it."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Oscillator, linearise, newton, solve_blocks
-from .basis import Basis, resize
+from .basis import Basis, basis_for, resize
 from .response import Branch
 from .scaling import Stages
+from .single import march_alone
 from .starts import Cubic, mean_of, mean_starts
 
-__all__ = ["March", "correct", "cubic_of", "first_phasor", "march", "means_under", "oscillator", "past_fold", "push"]
+__all__ = [
+    "March", "branches_of", "classify", "correct", "cubic_of", "first_phasor", "layer_of", "march", "means_under",
+    "oscillator", "past_fold", "push",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Bools = NDArray[np.bool_]
+Wholes = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -39,20 +44,48 @@ class March:
 
 def oscillator(stages: Stages, m: int) -> Oscillator:
     """Oscillator m of every setting."""
-    return Oscillator(stages.omega, stages.k[m], stages.delta, stages.sign)
+    delta, sign = (each[m] if len(each) > 1 else each[0] for each in (stages.delta, stages.sign))
+    return Oscillator(stages.omega, stages.k[m], delta, sign)
 
 
-def push(stages: Stages, basis: Basis, m: int, before: Floats | None) -> Floats:
-    """Force on oscillator m; float64, shape (d, N). `before` is the series of oscillator m - 1."""
-    if before is None:
-        force = np.zeros((basis.size, len(stages)))
-        if basis.order:
-            force[0], force[1] = stages.drive.real, stages.drive.imag
-    else:
-        force = stages.lam[m] * before
+def layer_of(stages: Stages, layer: Wholes) -> Oscillator:
+    """The oscillators `layer` of every setting, side by side: (M, N) lanes become M N."""
+    if len(layer) == 1:
+        return oscillator(stages, int(layer[0]))
+    delta, sign = (np.repeat(stages.of_each(value)[layer], len(stages)) for value in (stages.delta, stages.sign))
+    return Oscillator(np.tile(stages.omega, len(layer)), stages.k[layer].reshape(-1), delta, sign)
+
+
+def push(stages: Stages, basis: Basis, m: int, before: Floats | None, above: Floats | None = None) -> Floats:
+    """Force on oscillator m; float64, shape (d, N). `before` and `above` are the series of those that feed it."""
+    force = np.zeros((basis.size, len(stages))) if before is None else stages.lam[m] * before
+    if m == 0 and basis.order:
+        force[0], force[1] = stages.drive.real, stages.drive.imag
+    if above is not None and stages.other is not None:
+        force += stages.other[m] * above
     if basis.mean:
         force[-1] += stages.force[m]
     return force
+
+
+def push_layer(stages: Stages, basis: Basis, layer: Wholes, x: Floats) -> Floats:
+    """Force on the oscillators `layer`, side by side; float64, shape (d, M N)."""
+    if len(layer) == 1:
+        m = int(layer[0])
+        above = x[m + stages.stride] if m >= -stages.stride > 0 else None
+        return push(stages, basis, m, x[m - 1] if m else None, above)
+    force = np.zeros((len(layer), basis.size, len(stages)))
+    for links, source in ((stages.lam, layer - 1), (stages.other, layer + stages.stride)):
+        if links is not None:
+            force += links[layer][:, None] * np.where((source >= 0)[:, None, None], x[np.maximum(source, 0)], 0.0)
+    if basis.mean:
+        force[:, -1] += stages.force[layer]
+    return _side_by_side(force)
+
+
+def _side_by_side(x: Floats) -> Floats:
+    """(M, d, N) as (d, M N)."""
+    return x[0] if len(x) == 1 else x.transpose(1, 0, 2).reshape(x.shape[1], -1)
 
 
 def first_phasor(x: Floats) -> Complexes:
@@ -68,33 +101,37 @@ def cubic_of(osc: Oscillator, force: Complexes) -> Cubic:
 
 def march(stages: Stages, basis: Basis, guide: Floats | None = None) -> March:
     """Solve the chain in `basis`, on the lower branch, or from the coordinates `guide` (n, d, N)."""
+    if len(stages) == 1 and guide is None and basis is basis_for(3, False) and not stages.linear and not stages.stride:
+        alone = march_alone(stages)
+        if alone is not None:
+            series, count = alone
+            return March(basis, series, np.ones(1, dtype=bool), branches_of(stages, basis, series), count)
     x = np.empty((stages.n, basis.size, len(stages)))
     ok = np.ones(len(stages), dtype=bool)
     branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
-    steps = 0
-    before = None
-    for m in range(stages.n):
-        osc, force = oscillator(stages, m), push(stages, basis, m, before)
-        cubic = cubic_of(osc, first_phasor(force)) if basis.order and osc.sign else None
-        start = guide[m] if guide is not None else _low_start(osc, basis, force, cubic)
+    steps, size, lanes = 0, len(stages), basis.size
+    for layer in stages.layers:
+        osc, force = layer_of(stages, layer), push_layer(stages, basis, layer, x)
+        cubic = cubic_of(osc, first_phasor(force)) if basis.order and not stages.linear else None
+        start = _side_by_side(guide[layer]) if guide is not None else _low_start(osc, basis, force, cubic)
         solved = newton(basis, osc, force, start)
-        x[m], ok, steps = solved.x, ok & solved.ok, steps + solved.steps
+        steps += solved.steps
+        ok &= solved.ok.reshape(-1, size).all(axis=0)
+        x[layer] = solved.x.reshape(lanes, -1, size).transpose(1, 0, 2)
         if cubic is not None:
-            branch[m] = _classify(cubic, first_phasor(solved.x))
-        before = solved.x
+            branch[layer] = classify(cubic, first_phasor(solved.x)).reshape(-1, size)
     return March(basis, x, ok, branch, steps)
 
 
 def correct(stages: Stages, basis: Basis, x: Floats, old: Basis) -> Floats:
     """One Newton step of the whole chain in `basis` from x (n, d, N) in `old`; errors travel down the chain."""
     moved = np.empty((stages.n, basis.size, len(stages)))
-    before = None
-    for m in range(stages.n):
-        osc = oscillator(stages, m)
-        here = resize(x[m], old, basis)
+    for layer in stages.layers:
+        osc = layer_of(stages, layer)
+        here = resize(_side_by_side(x[layer]), old, basis)
         jacobian, twice = linearise(basis, osc.coefficients(basis), osc.sign, here)
-        before = solve_blocks(jacobian, push(stages, basis, m, before) + twice)
-        moved[m] = before
+        found = solve_blocks(jacobian, push_layer(stages, basis, layer, moved) + twice)
+        moved[layer] = found.reshape(basis.size, -1, len(stages)).transpose(1, 0, 2)
     return moved
 
 
@@ -120,15 +157,30 @@ def _low_start(osc: Oscillator, basis: Basis, force: Floats, cubic: Cubic | None
     return start
 
 
-def _classify(cubic: Cubic, phasor: Complexes) -> NDArray[np.int8]:
+def classify(cubic: Cubic, phasor: Complexes) -> NDArray[np.int8]:
+    """`Branch` of an oscillator of first harmonic `phasor`: on which side of the folds it lies."""
     if not cubic.folded.any():
         return np.full(phasor.shape, Branch.LOW, dtype=np.int8)
-    v = 0.75 * (phasor.real**2 + phasor.imag**2)
+    v = cubic.measure(phasor)
     label = np.full(v.shape, Branch.MIDDLE, dtype=np.int8)
     label[v < cubic.peak] = Branch.LOW
     label[v > cubic.dip] = Branch.HIGH
     label[~cubic.multiple] = Branch.LOW
     return label
+
+
+def branches_of(stages: Stages, basis: Basis, x: Floats) -> NDArray[np.int8]:
+    """`Branch` of each oscillator given its input; int8, shape (n, N)."""
+    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
+    if not basis.order or stages.linear:
+        return branch
+    phasor = x[:, 0] + 1j * x[:, 1]
+    force = np.zeros_like(phasor)
+    force[0] = stages.drive
+    for fed, source, link in stages.links():
+        force[fed] += link * phasor[source]
+    label = classify(cubic_of(layer_of(stages, np.arange(stages.n)), force.reshape(-1)), phasor.reshape(-1))
+    return label.reshape(branch.shape)
 
 
 def past_fold(stages: Stages, basis: Basis, x: Floats) -> Bools:
@@ -137,24 +189,25 @@ def past_fold(stages: Stages, basis: Basis, x: Floats) -> Bools:
     Between the two folds of the cubic lies its inflection: the branch from 0 is below it.
     """
     past = np.zeros(len(stages), dtype=bool)
-    if not (basis.order and stages.sign):
+    if not basis.order or stages.linear:
         return past
     for m in range(stages.n):
-        here = x[m, :, :]
-        v = 0.75 * (here[0] ** 2 + here[1] ** 2)
-        stiffness = stages.k[m] + 3 * stages.sign * (here[-1] ** 2 if basis.mean else 0.0)
-        bend = stages.sign * (stages.omega**2 - stiffness)
-        past |= (bend > np.sqrt(3) * stages.delta * stages.omega) & (v > 2 * bend / 3)
+        here, osc = x[m, :, :], oscillator(stages, m)
+        # In units of the oscillator's own cubic term.
+        v = 0.75 * np.abs(osc.sign) * (here[0] ** 2 + here[1] ** 2)
+        stiffness = osc.k + 3 * osc.sign * (here[-1] ** 2 if basis.mean else 0.0)
+        bend = np.sign(osc.sign) * (stages.omega**2 - stiffness)
+        past |= (bend > np.sqrt(3) * osc.delta * stages.omega) & (v > 2 * bend / 3)
     return past
 
 
 def means_under(stages: Stages, phasor: Complexes) -> Floats:
     """Mean of every oscillator that vibrates with `phasor` (n, N); float64, shape (n, N), 0 where none is known."""
     means = np.zeros((stages.n, len(stages)))
-    constant = stages.force[0]
     for m in range(stages.n):
-        if m:
-            constant = stages.lam[m] * means[m - 1] + stages.force[m]
-        stiffness = stages.k[m] + 1.5 * stages.sign * np.abs(phasor[m]) ** 2
-        means[m] = np.nan_to_num(mean_of(stiffness, stages.sign, constant))
+        constant, osc = stages.force[m], oscillator(stages, m)
+        for source, link in stages.inputs(m):
+            constant = constant + link * means[source]
+        stiffness = osc.k + 1.5 * osc.sign * np.abs(phasor[m]) ** 2
+        means[m] = np.nan_to_num(mean_of(stiffness, osc.sign, constant))
     return means

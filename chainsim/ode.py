@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chain import Chain, Setting
+from .march import classify
 from .response import Branch, Outcome, Response, Stats
 from .rung import Rung, RungError, Start
 from .scaled import Problem, scaled
-from .shooting import Orbits, shoot
+from .shooting import FAR_SMALLER, Orbits, shoot
+from .starts import Cubic
 from .transient import Settled, settle
 
 __all__ = ["OdeRung", "Reached", "reached_from_rest", "steady_from_rest"]
@@ -24,6 +26,7 @@ Lanes = NDArray[np.int64]
 _FIRST_STEPS = 32
 _DOUBLINGS = 7
 _ORDER = 4  # The lowest order in the composition's error, so a bound for what a doubling gains.
+_MOST_WORK = 1 << 18  # Steps per period times oscillators, beyond which steps are not doubled again.
 _USABLE = 1e-6
 _AT_FLOOR = 1e-9  # Below this an error that no longer falls is round-off.
 _ROUNDING = 4e-16  # Relative round-off per step, measured against a Taylor integrator at 1e-18.
@@ -73,7 +76,7 @@ def steady_from_rest(chain: Chain, setting: Setting, *, tol: float, max_periods:
     -------
     Response with seven harmonics. `ESCAPED`: |z| passed 50/sqrt|beta| (beta < 0) or 1e9; `NOT_LOCKED`: the
     motion goes on without repeating after the drive's period; `OUT_OF_BUDGET`: neither was sure in time;
-    `NO_CONVERGENCE`: the orbit was reached but could not be refined to `tol` or 1e-6.
+    `NO_CONVERGENCE`: the orbit was reached but could not be refined to `tol` or 1e-6, or is not stable when refined.
 
     Raises
     ------
@@ -111,7 +114,7 @@ class _Polished:
             steps = max(4 * int(value), _FIRST_STEPS)
             lanes = self._shoot(np.flatnonzero(reached & (self.settled.steps == value)), steps)
             for _ in range(_DOUBLINGS):
-                if not len(lanes):
+                if not len(lanes) or steps * self.problem.n > _MOST_WORK:
                     break
                 steps *= 2
                 before = self.error.copy()
@@ -123,7 +126,7 @@ class _Polished:
         """Solve `lanes` at `steps`, note the change since the last solve; returns those that were found."""
         orbits = shoot(self.problem, lanes, self.state[lanes], steps)
         self.turns += orbits.turns
-        self.kicks += 7 * steps * orbits.turns * (self.problem.n if self.problem.ring else 1)
+        self.kicks += 7 * steps * orbits.turns * (self.problem.n if self.problem.joint else 1)
         lanes, change = lanes[orbits.found], self._change(lanes, orbits)
         # Rounded flow coefficients err alike in every step, so round-off grows with the steps and with Q.
         gap = np.min(np.abs(1 - orbits.multipliers[orbits.found]), axis=2)
@@ -138,6 +141,8 @@ class _Polished:
         """Largest change of any harmonic, relative to its oscillator's largest; inf at the first solve."""
         old, new = self.harmonics[lanes[orbits.found]], orbits.harmonics[orbits.found]
         size = np.max(np.abs(new), axis=1)
+        if self.problem.joint:
+            size = np.maximum(size, FAR_SMALLER * np.max(size, axis=1, keepdims=True, initial=0.0))
         change = np.max(np.abs(new - old), axis=1)
         ratio = np.divide(change, size, out=np.zeros_like(size), where=size > 0)
         worst: Floats = np.nan_to_num(np.max(ratio, axis=1), nan=np.inf)
@@ -147,17 +152,19 @@ class _Polished:
         """The answer in the chain's own units."""
         outcome = np.array(self.settled.outcome)
         reached = outcome == Outcome.OK
-        outcome[reached & ~(self.error <= max(tol, _USABLE))] = Outcome.NO_CONVERGENCE
+        with np.errstate(invalid="ignore"):
+            inside = np.max(np.abs(self.multipliers), axis=(1, 2)) < 1
+        # An orbit that only the coarse steps of the transient find stable is none that is reached.
+        outcome[reached & ~(inside & (self.error <= max(tol, _USABLE)))] = Outcome.NO_CONVERGENCE
         ok = outcome == Outcome.OK
         harmonics = self.harmonics / self.problem.scale
         harmonics[~ok] = np.nan
-        with np.errstate(invalid="ignore"):
-            stable = ok & (np.max(np.abs(self.multipliers), axis=(1, 2)) < 1)
         stats = _stats(self.problem, self.settled, self.turns, time.perf_counter() - began, self.kicks)
         branch = _branches(self.problem, self.harmonics, ok)
         answer = Response(
-            rung=OdeRung.name, outcome=outcome, harmonics=harmonics[:, 1:], mean=harmonics[:, 0].real, stable=stable,
-            locked=ok, multipliers=self.multipliers, branch=branch, error_estimate=self.error, stats=stats,
+            rung=OdeRung.name, outcome=outcome, harmonics=harmonics[:, 1:], mean=harmonics[:, 0].real,
+            stable=np.array(ok), locked=ok, multipliers=self.multipliers, branch=branch,
+            error_estimate=self.error, stats=stats,
         )  # fmt: skip
         for array in (value for value in vars(answer).values() if isinstance(value, np.ndarray)):
             array.flags.writeable = False
@@ -165,28 +172,17 @@ class _Polished:
 
 
 def _branches(problem: Problem, harmonics: NDArray[np.complex128], ok: NDArray[np.bool_]) -> NDArray[np.int8]:
-    """Branch of each oscillator: where its amplitude stands among the roots of the one-harmonic cubic.
-
-    With u = a^2 and F the first harmonic of what drives it:
-    ``u ((1 + lam - omega^2 + 3/4 beta u)^2 + delta^2 omega^2) = F^2``.
-    """
+    """`Branch` of each oscillator under the first harmonic of what drives it; int8, shape (N, n)."""
     branch = np.full((len(problem), problem.n), Branch.LOW, dtype=np.int8)
-    if problem.beta == 0 or not ok.any():
+    if problem.linear or not ok.any():
         return branch
-    omega = (2 * np.pi / problem.period)[ok, None]
-    first, slope = harmonics[ok, 1], 0.75 * problem.beta
-    force = problem.lam[ok] * np.roll(first, 1, axis=1)
-    force[:, 0] += problem.drive[ok, 0] - 1j * problem.drive[ok, 1]
-    stiff = 1 + problem.lam[ok] - omega**2
-    companion = np.zeros((*first.shape, 3, 3))
-    companion[..., 1, 0] = companion[..., 2, 1] = 1
-    companion[..., 0, 2] = np.abs(force) ** 2 / slope**2
-    companion[..., 1, 2] = -(stiff**2 + (problem.delta * omega) ** 2) / slope**2
-    companion[..., 2, 2] = -2 * stiff / slope
-    roots = np.linalg.eigvals(companion).astype(np.complex128)
-    three = np.all(np.abs(roots.imag) <= 1e-9 * np.abs(roots), axis=-1)
-    nearest = np.argmin(np.abs(np.sort(roots.real, axis=-1) - np.abs(first[..., None]) ** 2), axis=-1)
-    branch[ok] = np.where(three, nearest, Branch.LOW)
+    it = problem.network
+    omega = (2 * np.pi / it.period)[ok, None]
+    first = harmonics[ok, 1]
+    force = it.lam[ok] * np.roll(first, 1, axis=1) + it.other[ok] * np.roll(first, -it.stride, axis=1)
+    force[:, 0] += it.drive[ok, 0] - 1j * it.drive[ok, 1]
+    cubic = Cubic.of(it.stiffness[ok] - omega**2, it.delta * omega, it.beta, force)
+    branch[ok] = classify(cubic, first)
     return branch
 
 

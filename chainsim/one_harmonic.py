@@ -11,8 +11,7 @@ from .answer import Answer, defect, outcomes, response_of
 from .basis import basis_for
 from .branches import all_branches
 from .chain import Chain, Setting
-from .harmonic_balance import open_refusal
-from .march import march, past_fold
+from .harmonic_balance import branch_refusal, lower_branch
 from .response import Outcome, Response, Stats
 from .rung import Rung, Start
 from .scaling import Stages
@@ -28,21 +27,20 @@ class OneHarmonicRung(Rung):
     valid = "beta a^2 << 1 (the third harmonic is beta a^2 / 32 of the first)"
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
-        """Open chains only; every branch only of one setting."""
-        return open_refusal(chain, setting, start)
+        """Every branch only of one setting, and only where oscillators can be solved in turn."""
+        return branch_refusal(chain, setting, start)
 
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
         """The lower branch (rest, ramp) or every branch (all)."""
         began = time.perf_counter()
         stages = Stages.of(chain, setting)
         basis = basis_for(1, stages.has_mean)
-        found = all_branches(stages, basis) if start is Start.ALL else march(stages, basis)
+        found = all_branches(stages, basis) if start is Start.ALL else lower_branch(stages, basis, start)
         if start is Start.ALL:
             stages = stages.pick(np.zeros(len(found.ok), dtype=np.intp))
-        ok = found.ok & ~past_fold(stages, basis, found.x) if start is Start.RAMP else found.ok
         outcome = outcomes(len(stages), Outcome.OK)
-        outcome[~ok] = Outcome.NO_CONVERGENCE
-        flow = None if basis.mean else _slow_flow(stages, found.x)
+        outcome[~found.ok] = Outcome.NO_CONVERGENCE
+        flow = None if basis.mean or stages.joint else _slow_flow(stages, found.x)
         answer = Answer(basis, found.x, outcome, found.branch, defect(stages, basis, found.x), flow)
         work = Stats(newton_steps=found.steps, oscillators_solved=stages.n * len(stages))
         return response_of(stages, self.name, answer, work, began)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .splitting import FLOWS, KICKS, System, flow
+from .network import Network, flows_of
+from .splitting import KICKS
 
-__all__ = ["HARMONICS", "map_ring", "shoot_open"]
+__all__ = ["HARMONICS", "map_joint", "shoot_forward"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -24,15 +25,7 @@ HARMONICS = 7
 _ROUNDS = 14
 _STALL = 1e-9
 _CLOSE = 1e-14
-
-
-@compiled
-def _flows(delta: float, lam: float, h: float) -> Floats:
-    """Coefficients of the eight flows of one step, shape (8, 3)."""
-    found = np.empty((8, 3))
-    for k in range(8):
-        found[k, 0], found[k, 1], found[k, 2] = flow(delta, 1.0 + lam, FLOWS[k] * h)
-    return found
+_NOTHING = 1e-290  # Corrections so small have lost their digits.
 
 
 @compiled
@@ -54,13 +47,13 @@ def _one_period(
     """One oscillator over one period under the force at every kick.
 
     `seen` receives its position at every kick, `samples` at every step's start, `end` the final q, p, the
-    tangent (row by row) and the largest q^2 + p^2.
+    tangent (row by row) and the largest |q| or |p|.
     """
     x, y, high = start[0], start[1], 0.0
     xx, xy, yx, yy = 1.0, 0.0, 0.0, 1.0
     for s in range(len(samples)):
         samples[s] = x
-        high = max(high, x * x + y * y)
+        high = max(high, abs(x), abs(y))
         for k in range(8):
             c, g, d = flows[k, 0], flows[k, 1], flows[k, 2]
             x, y = c * x + g * y, c * y - d * x
@@ -88,10 +81,10 @@ def _newton(
         a, b, c, d = 1.0 - end[2], -end[3], -end[4], 1.0 - end[5]
         det = a * d - b * c
         dx, dy = (d * r - b * t) / det, (a * t - c * r) / det
-        size = np.sqrt(dx * dx + dy * dy)
-        if size == 0.0:
+        size = np.hypot(dx, dy)
+        if size <= _NOTHING:
             return 0.0, turn + 1
-        size /= max(np.sqrt(end[6]), size)
+        size /= max(end[6], size)
         if not size <= 1.0:
             return np.nan, turn + 1
         if size < _CLOSE or (size < _STALL and size > 0.5 * last):
@@ -103,11 +96,24 @@ def _newton(
 
 
 @compiled
-def shoot_open(
-    state: Floats, lanes: Lanes, system: System, table: Floats,
+def _forces(m: int, i: int, network: Network, table: Floats, seen: Floats, force: Floats) -> None:
+    """Force on oscillator `m` of setting `i` at every kick; `seen` holds those before it, in turn."""
+    depth = len(seen)
+    force[:] = network.constant[i, m]
+    if m == 0:
+        force += network.drive[i, 0] * table[:, :, 0] + network.drive[i, 1] * table[:, :, 1]
+    else:
+        force += network.lam[i, m] * seen[(m - 1) % depth]
+    if network.other[i, m] != 0.0:
+        force += network.other[i, m] * seen[(m + network.stride) % depth]
+
+
+@compiled
+def shoot_forward(
+    state: Floats, lanes: Lanes, network: Network, table: Floats,
     harmonics: Complexes, tangent: Floats, defect: Floats, turns: Lanes,
 ) -> None:  # fmt: skip
-    """Periodic orbits of open chains, oscillator by oscillator, from the guesses in `state`.
+    """Periodic orbits of open chains and grids, oscillator by oscillator, from the guesses in `state`.
 
     Parameters
     ----------
@@ -116,22 +122,22 @@ def shoot_open(
     tangent : float64, shape (L, n, 2, 2), receives the monodromy blocks.
     defect : float64, shape (L, n), receives the last relative correction, NaN where Newton failed.
     turns : int64, shape (L,), receives the Newton corrections made.
-    The rest as in `splitting.advance_block`.
+    The rest as in `network.advance_network`.
     """
-    lam, constant, drive = system.lam, system.constant, system.drive
-    n, steps = lam.shape[1], table.shape[0]
-    force, seen = np.empty((steps, 7)), np.empty((steps, 7))
+    n, steps = network.lam.shape[1], table.shape[0]
+    force, seen = np.empty((steps, 7)), np.empty((max(1, abs(network.stride)) + 1, steps, 7))
     samples, end, start = np.empty(steps), np.empty(7), np.empty(2)
     for j in range(len(lanes)):
         i = lanes[j]
-        h = system.period[i] / steps
-        force[:] = constant[i, 0] + drive[i, 0] * table[:, :, 0] + drive[i, 1] * table[:, :, 1]
+        h = network.period[i] / steps
         turns[j] = 0
         defect[j] = np.nan
         for m in range(n):
             start[0], start[1] = state[j, m], state[j, n + m]
-            flows = _flows(system.delta, lam[i, m], h)
-            defect[j, m], done = _newton(start, h, flows, force, system.beta, seen, samples, end)
+            _forces(m, i, network, table, seen, force)
+            flows = flows_of(network.delta[m], network.stiffness[i, m], h)
+            here = seen[m % len(seen)]
+            defect[j, m], done = _newton(start, h, flows, force, network.beta[m], here, samples, end)
             turns[j] += done
             if np.isnan(defect[j, m]):
                 break
@@ -139,13 +145,11 @@ def shoot_open(
             tangent[j, m, 0, 0], tangent[j, m, 0, 1] = end[2], end[3]
             tangent[j, m, 1, 0], tangent[j, m, 1, 1] = end[4], end[5]
             _measure(samples, harmonics[j, :, m])
-            if m + 1 < n:
-                force[:] = constant[i, m + 1] + lam[i, m + 1] * seen
 
 
 @compiled
-def _ring_step(y: Floats, dy: Floats, flows: Floats, h: float, system: System, i: int, phases: Floats) -> None:
-    """One step of ring `i`: `y` is (2, n), q and p; `dy` is (2, n, 2n), their tangent."""
+def _joint_step(y: Floats, dy: Floats, flows: Floats, h: float, network: Network, i: int, phases: Floats) -> None:
+    """One step of setting `i`: `y` is (2, n), q and p; `dy` is (2, n, 2n), their tangent."""
     q, p, dq, dp = y[0], y[1], dy[0], dy[1]
     n = len(q)
     for k in range(8):
@@ -158,40 +162,41 @@ def _ring_step(y: Floats, dy: Floats, flows: Floats, h: float, system: System, i
         if k == 7:
             return
         b = KICKS[k] * h
-        p[0] += b * (system.drive[i, 0] * phases[k, 0] + system.drive[i, 1] * phases[k, 1])
+        p[0] += b * (network.drive[i, 0] * phases[k, 0] + network.drive[i, 1] * phases[k, 1])
         for m in range(n):
-            before = m - 1 if m else n - 1
-            x = q[m]
-            p[m] += b * (system.constant[i, m] + system.lam[i, m] * q[before] - system.beta * x * x * x)
-            own, link = -3.0 * b * system.beta * x * x, b * system.lam[i, m]
+            # Links that are not there have strength 0, wherever the index falls.
+            before, second = (m - 1) % n, (m + network.stride) % n
+            x, lam, other = q[m], network.lam[i, m], network.other[i, m]
+            p[m] += b * (network.constant[i, m] + lam * q[before] + other * q[second] - network.beta[m] * x * x * x)
+            own = -3.0 * b * network.beta[m] * x * x
             for w in range(2 * n):
-                dp[m, w] += own * dq[m, w] + link * dq[before, w]
+                dp[m, w] += own * dq[m, w] + b * (lam * dq[before, w] + other * dq[second, w])
 
 
 @compiled
-def map_ring(
-    state: Floats, lanes: Lanes, system: System, table: Floats,
+def map_joint(
+    state: Floats, lanes: Lanes, network: Network, table: Floats,
     end: Floats, tangent: Floats, high: Floats, harmonics: Complexes,
 ) -> None:  # fmt: skip
-    """One period of rings from `state`, shape (L, 2n): the end, the tangent and each oscillator's size.
+    """One period of coupled oscillators from `state`, shape (L, 2n): the end, the tangent and each one's size.
 
-    `end` is float64, shape (L, 2n); `tangent` (L, 2n, 2n); `high` (L, n), the largest q^2 + p^2 at a step's
-    start; `harmonics` complex128, shape (L, 8, n). The rest as in `shoot_open`.
+    `end` is float64, shape (L, 2n); `tangent` (L, 2n, 2n); `high` (L, n), the largest |q| or |p| at a step's
+    start; `harmonics` complex128, shape (L, 8, n). The rest as in `shoot_forward`.
     """
-    n, steps = system.lam.shape[1], table.shape[0]
+    n, steps = network.lam.shape[1], table.shape[0]
     samples, flows = np.empty((n, steps)), np.empty((n, 8, 3))
     for j in range(len(lanes)):
         i = lanes[j]
-        h = system.period[i] / steps
+        h = network.period[i] / steps
         y, dy = state[j].copy().reshape(2, n), np.eye(2 * n).reshape(2, n, 2 * n)
         for m in range(n):
-            flows[m] = _flows(system.delta, system.lam[i, m], h)
+            flows[m] = flows_of(network.delta[m], network.stiffness[i, m], h)
             high[j, m] = 0.0
         for s in range(steps):
             for m in range(n):
                 samples[m, s] = y[0, m]
-                high[j, m] = max(high[j, m], y[0, m] * y[0, m] + y[1, m] * y[1, m])
-            _ring_step(y, dy, flows, h, system, i, table[s])
+                high[j, m] = max(high[j, m], abs(y[0, m]), abs(y[1, m]))
+            _joint_step(y, dy, flows, h, network, i, table[s])
         end[j] = y.reshape(2 * n)
         tangent[j] = dy.reshape(2 * n, 2 * n)
         for m in range(n):

@@ -110,7 +110,7 @@ class Response:
     def third(self) -> NDArray[np.complex128]:
         """Third harmonic, complex128, shape (N, n); zero where the rung does not model it."""
         if self.harmonics.shape[1] < 3:
-            return np.zeros_like(self.phasor)
+            return np.where(np.isnan(self.phasor), self.phasor, 0.0)
         third: NDArray[np.complex128] = self.harmonics[:, 2, :]
         return third
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .chain import Chain, Setting
 from .march import cubic_of, oscillator
+from .monodromy import MOST_JOINT, rest_matrix
 from .response import Response
 from .scaling import Stages
 
@@ -31,15 +32,67 @@ def sure_from_rest(chain: Chain, setting: Setting, response: Response) -> Bools:
     asks for an integration.
     """
     stages = Stages.of(chain, setting)
+    if stages.joint or chain.rows > 1:
+        with np.errstate(all="ignore"):
+            return response.stable & _contracting(stages, response)
     size = np.abs(response.phasor.T) * stages.length
     mean = np.abs(response.mean.T) * stages.length
     with np.errstate(all="ignore"):
         peak = _peaks(stages, size + mean) + size + mean
-        top = np.sqrt(np.maximum(stages.k, 0.0)) if stages.sign < 0 else np.ones_like(peak)
+        top = np.sqrt(np.maximum(stages.k, 0.0) / np.where(stages.sign < 0, -stages.sign, 1.0))
+        top[np.broadcast_to(stages.sign >= 0, top.shape)] = 1.0
         checks = [response.stable, (peak < WELL * top).all(axis=0)]
         checks += [_alone_or_low(stages, response, m, peak[m]) for m in range(stages.n)]
     sure: Bools = np.logical_and.reduce(checks)
     return sure
+
+
+def _contracting(stages: Stages, response: Response) -> Bools:
+    """Whether every motion from rest ends in one orbit, the one of `response`; bool, shape (N,).
+
+    With g the largest response of |z| to any force of size 1 without the cubic term, |z| <= R with R = g F + g R^3, and
+    two motions within R approach each other while 3 g R^2 < 1.
+    """
+    sums = _forward_gains(stages) if not stages.joint else _joint_gains(stages)
+    load = np.abs(stages.force)
+    load[0] += np.abs(stages.drive)
+    first, gain = (sums * load[None]).sum(axis=1).max(axis=0), sums.sum(axis=1).max(axis=0)
+    radius = first
+    for _ in range(60):
+        radius = first + gain * radius**3
+    size = (np.abs(response.harmonics).sum(axis=1) + np.abs(response.mean)).max(axis=1) * stages.length
+    calm: Bools = (3 * gain * radius**2 < 1) & (size <= 1.001 * radius)
+    return calm
+
+
+def _joint_gains(stages: Stages) -> Floats:
+    """Bounds of the integrals of |z_m| after an impulse on oscillator j; float64, shape (n, n, N), inf if unknown."""
+    n, size = stages.n, len(stages)
+    if n > MOST_JOINT:
+        return np.full((n, n, size), np.inf)
+    exponents, modes = np.linalg.eig(rest_matrix(stages))
+    decay = -exponents.real * stages.omega[:, None]
+    weights = np.abs(np.linalg.pinv(modes))[:, :, n:] / (stages.omega[:, None, None] * decay[:, :, None])
+    gains = np.abs(modes[:, :n]) @ np.where(decay[:, :, None] > 0, weights, np.inf)
+    # A nearly defective matrix makes the sum over its modes worthless, which its size shows.
+    bounds: Floats = np.nan_to_num(gains, nan=np.inf).transpose(1, 2, 0)
+    return bounds
+
+
+def _forward_gains(stages: Stages) -> Floats:
+    """The same where each oscillator is fed by those before it only: the integrals multiply along the way."""
+    n, size = stages.n, len(stages)
+    if n > MOST_JOINT:
+        return np.full((n, n, size), np.inf)
+    own = stages.k - 0.25 * stages.delta**2
+    swing = np.where(own > 0, 1 / np.tanh(np.pi * stages.delta / (4 * np.sqrt(own))), 1.0) / stages.k
+    gains = np.zeros((n, n, size))
+    for m in range(n):
+        gains[m, m] = 1.0
+        for source, link in stages.inputs(m):
+            gains[m] += np.abs(link) * gains[source]
+        gains[m] *= swing[m]
+    return np.nan_to_num(gains, nan=np.inf)
 
 
 def _peaks(stages: Stages, size: Floats) -> Floats:
@@ -50,13 +103,15 @@ def _peaks(stages: Stages, size: Floats) -> Floats:
     by D it is multiplied by lam/(nu D). The peak of t^j e^{-delta t/2} is (2 j/(delta e))^j.
     """
     nu = np.sqrt(np.maximum(stages.k - 0.25 * stages.delta**2, 1e-3 * np.abs(stages.k)))
+    # The slowest decay of any oscillator bounds them all.
+    delta = stages.delta.min()
     terms: list[Floats] = []
     peaks = np.empty_like(size)
     for m in range(stages.n):
         own = size[m] * np.maximum(1.0, stages.omega / nu[m])
         if m:
             apart = np.abs(nu[:m] - nu[m]).min(axis=0)
-            resonant = apart <= stages.delta
+            resonant = apart <= delta
             climb = np.where(resonant, stages.lam[m] / (2 * nu[m]), 0.0)
             pass_on = np.where(resonant, 0.0, stages.lam[m] / (nu[m] * apart))
             grown = [climb * term / (j + 1) for j, term in enumerate(terms)]
@@ -65,7 +120,7 @@ def _peaks(stages: Stages, size: Floats) -> Floats:
         else:
             terms = [own]
         peaks[m] = terms[0] + sum(
-            (term * (2 * j / (stages.delta * np.e)) ** j for j, term in enumerate(terms) if j), start=np.zeros(())
+            (term * (2 * j / (delta * np.e)) ** j for j, term in enumerate(terms) if j), start=np.zeros(())
         )
     return peaks
 
@@ -73,13 +128,14 @@ def _peaks(stages: Stages, size: Floats) -> Floats:
 def _alone_or_low(stages: Stages, response: Response, m: int, peak: Floats) -> Bools:
     """Oscillator m has one answer under its input, or its transient stays far below the fold of the lower one."""
     force = stages.drive if m == 0 else stages.lam[m] * response.phasor[:, m - 1] * stages.length
-    cubic = cubic_of(oscillator(stages, m), force)
+    osc = oscillator(stages, m)
+    cubic = cubic_of(osc, force)
     if not stages.has_mean:
         below, above = cubic.c <= NEAR * cubic.value(cubic.peak), cubic.c * NEAR >= cubic.value(cubic.dip)
         several = cubic.folded & below & above
     else:
         # A mean tilts the cubic: wherever it could bend the wrong way, ask for the margin below.
-        several = -stages.sign * cubic.kappa + 3 * peak**2 > np.sqrt(3) * cubic.g
+        several = -cubic.sign * cubic.kappa + 3 * cubic.strength * peak**2 > np.sqrt(3) * cubic.g
     several &= np.abs(stages.drive) > 0
     fold = np.where(cubic.folded, cubic.peak, 0.0)
-    return ~several | (0.75 * peak**2 < FOLD**2 * fold)
+    return ~several | (0.75 * cubic.strength * peak**2 < FOLD**2 * fold)

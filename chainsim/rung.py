@@ -20,6 +20,7 @@ RUNGS = {
     "linear": ("chainsim.linear", "LinearRung"),
     "one_harmonic": ("chainsim.one_harmonic", "OneHarmonicRung"),
     "harmonic_balance": ("chainsim.harmonic_balance", "HarmonicBalanceRung"),
+    "envelope": ("chainsim.envelope_rung", "EnvelopeRung"),
     "ode": ("chainsim.ode", "OdeRung"),
 }
 

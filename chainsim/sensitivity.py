@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import linearise
+from .balance import Oscillator, linearise
 from .basis import Basis, basis_for
-from .chain import Chain, Closure, Setting
+from .chain import Chain, CouplingKind, Setting
 from .march import oscillator
 from .response import Response
 from .rung import RungError
@@ -49,16 +49,17 @@ def gradient(chain: Chain, setting: Setting, response: Response) -> Gradient:
     Raises
     ------
     RungError
-        For a ring.
+        For a ring, a bidirectional chain or a grid.
     """
-    if chain.closure is Closure.RING:
-        raise RungError("gradient: open chains only; a ring has no sequential form")
+    if not chain.feed_forward or chain.rows > 1:
+        raise RungError("gradient: open chains only; a ring, bidirectional chain or grid has no sequential form")
     stages = Stages.of(chain, setting)
     if response.rung == "linear":
-        stages = replace(stages, sign=0.0)
+        stages = replace(stages, sign=np.zeros((1, 1)))
     basis, x = _series(stages, response)
     with np.errstate(all="ignore"):
-        table = _along(stages, basis, x, np.exp(1j * setting.phase))
+        back = chain.kind is CouplingKind.RESISTOR
+        table = _along(stages, basis, x, np.exp(1j * setting.phase), back)
     # The drive column is per scaled epsilon = epsilon * length, and phasors are x / length: the length cancels.
     table[:, :, 1:] /= stages.length
     table.flags.writeable = False
@@ -66,8 +67,11 @@ def gradient(chain: Chain, setting: Setting, response: Response) -> Gradient:
     return Gradient(table[:, :, 0], table[:, :, 1:n], table[:, :, n])
 
 
-def _along(stages: Stages, basis: Basis, x: Floats, turn: Complexes) -> Complexes:
-    """d phasor of every oscillator by scaled epsilon, the links 1..n-1 and omega; shape (N, n, n + 1)."""
+def _along(stages: Stages, basis: Basis, x: Floats, turn: Complexes, back: bool) -> Complexes:
+    """d phasor of every oscillator by scaled epsilon, the links 1..n-1 and omega; shape (N, n, n + 1).
+
+    `back` : whether links have the term - lam_m z_m.
+    """
     n, size = stages.n, len(stages)
     change = np.zeros((size, basis.size, n + 1))
     table = np.empty((size, n, n + 1), dtype=np.complex128)
@@ -78,8 +82,8 @@ def _along(stages: Stages, basis: Basis, x: Floats, turn: Complexes) -> Complexe
         if m == 0:
             change[:, 0, 0], change[:, 1, 0] = turn.real, turn.imag
         else:
-            change[:, :, m] = (x[m - 1] - x[m]).T
-        change[:, :, n] -= _by_omega(stages, basis, x[m])
+            change[:, :, m] = (x[m - 1] - x[m] if back else x[m - 1]).T
+        change[:, :, n] -= _by_omega(osc, basis, x[m])
         change = _solve(jacobian, change)
         table[:, m] = change[:, 0] + 1j * change[:, 1]
     return table
@@ -94,12 +98,12 @@ def _series(stages: Stages, response: Response) -> tuple[Basis, Floats]:
     return basis, np.ascontiguousarray(x.transpose(1, 0, 2))
 
 
-def _by_omega(stages: Stages, basis: Basis, x: Floats) -> Floats:
+def _by_omega(osc: Oscillator, basis: Basis, x: Floats) -> Floats:
     """d R / d omega = (-2 h^2 omega + i h delta) x, shape (N, d)."""
     slope = np.zeros_like(x)
     for row, h in enumerate(basis.harmonics):
         re, im = x[2 * row], x[2 * row + 1]
-        inertia, damping = -2 * h * h * stages.omega, h * stages.delta
+        inertia, damping = -2 * h * h * osc.omega, h * osc.delta
         slope[2 * row] = inertia * re - damping * im
         slope[2 * row + 1] = inertia * im + damping * re
     return slope.T

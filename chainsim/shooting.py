@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .period_map import HARMONICS, map_ring, shoot_open
+from .period_map import HARMONICS, map_joint, shoot_forward
 from .scaled import Problem, in_threads
 from .splitting import forcing_table
 
-__all__ = ["Orbits", "shoot"]
+__all__ = ["FAR_SMALLER", "Orbits", "shoot"]
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.int64]
@@ -19,6 +19,7 @@ Lanes = NDArray[np.int64]
 _ROUNDS = 14
 _CLOSE = 1e-14
 _STALL = 1e-9
+FAR_SMALLER = 1e-9
 
 
 @dataclass(frozen=True)
@@ -50,10 +51,10 @@ class Orbits:
 
 def shoot(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
     """Solve for the periodic orbits of settings `lanes` near `guess` (shape (L, 2n)) at `steps` per period."""
-    return (_shoot_rings if problem.ring else _shoot_chains)(problem, lanes, guess, steps)
+    return (_shoot_joint if problem.joint else _shoot_forward)(problem, lanes, guess, steps)
 
 
-def _shoot_chains(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
+def _shoot_forward(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
     count, n, table = len(lanes), problem.n, forcing_table(steps)
     state = np.array(guess)
     harmonics = np.full((count, HARMONICS + 1, n), np.nan, dtype=np.complex128)
@@ -61,8 +62,8 @@ def _shoot_chains(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> 
     defect, turns = np.full((count, n), np.nan), np.zeros(count, dtype=np.int64)
 
     def work(part: slice) -> None:
-        shoot_open(
-            state[part], lanes[part], problem.system, table,
+        shoot_forward(
+            state[part], lanes[part], problem.network, table,
             harmonics[part], tangent[part], defect[part], turns[part],
         )  # fmt: skip
 
@@ -82,7 +83,7 @@ def _block_multipliers(tangent: Floats) -> NDArray[np.complex128]:
     return np.stack([half + root, half - root], axis=-1)
 
 
-def _shoot_rings(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
+def _shoot_joint(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
     count, n, table = len(lanes), problem.n, forcing_table(steps)
     state, end, high = np.array(guess), np.empty((count, 2 * n)), np.empty((count, n))
     tangent, defect = np.empty((count, 2 * n, 2 * n)), np.full(count, np.nan)
@@ -93,7 +94,7 @@ def _shoot_rings(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> O
         mine = live[part]
         found = np.empty((len(mine), 2 * n)), np.empty((len(mine), 2 * n, 2 * n)), np.empty((len(mine), n))
         waves = np.empty((len(mine), HARMONICS + 1, n), dtype=np.complex128)
-        map_ring(state[mine], lanes[mine], problem.system, table, *found, waves)
+        map_joint(state[mine], lanes[mine], problem.network, table, *found, waves)
         end[mine], tangent[mine], high[mine] = found
         harmonics[mine] = waves
 
@@ -101,7 +102,7 @@ def _shoot_rings(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> O
         in_threads(work, len(live), 4)
         turns += len(live)
         live, step = _drop_lost(live, state, end, tangent)
-        size = _relative(step, np.sqrt(high[live]))
+        size = _relative(step, _in_view(high[live]))
         done = (size < _CLOSE) | ((size < _STALL) & (size > 0.5 * last[live]))
         defect[live[done]] = size[done]
         go = ~done & (size <= 1)
@@ -129,6 +130,12 @@ def _drop_lost(live: Lanes, state: Floats, end: Floats, tangent: Floats) -> tupl
     except np.linalg.LinAlgError:
         step = np.asarray((np.linalg.pinv(matrix) @ (end - state)[live][..., None])[..., 0], dtype=np.float64)
     return live, step
+
+
+def _in_view(size: Floats) -> Floats:
+    """Sizes (L, n) of oscillators that act on each other: one far smaller than the largest is as good as at rest."""
+    seen: Floats = np.maximum(size, FAR_SMALLER * np.max(size, axis=1, keepdims=True, initial=0.0))
+    return seen
 
 
 def _relative(step: Floats, size: Floats) -> Floats:

@@ -5,7 +5,10 @@ frozen position. The composition is ABA(8,6,4) of Blanes, Casas, Farres, Laskar,
 Appl. Numer. Math. 68 (2013) 58-72: with kicks of size eps, an error of eps h^8 + eps^2 h^6 + eps^3 h^4.
 
 The state of an oscillator is (q, p) with q = z and p = v + (delta/2) z, in which the damped flow over t is
-``q' = c q + s p, p' = c p - d q``.
+``q' = c q + s p, p' = c p - d q``: e^{-delta t/2} times a rotation, and a rotation is three shears, of p by q, of q by
+p, of p by q. The outer ones are of the kind of a kick and go with the kicks beside them; the factor goes into the
+forces and the cubic term, once a step into the state. So a kick and the flow after it take six multiplying
+instructions, and p's shears keep the determinant whatever is rounded.
 """
 
 from __future__ import annotations
@@ -17,18 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
+from .inlined import inlined
 
 __all__ = ["FLOWS", "KICKS", "KICK_TIMES", "WIDTH", "System", "advance_block", "flow", "forcing_table"]
 
 Floats = NDArray[np.float64]
 
 WIDTH = 16
-"""Settings advanced side by side: one block of a chain of six stays in the first-level cache."""
+"""Settings a caller should hand over together, or a multiple of it."""
 
-# One oscillator's share of the workspace, in runs of WIDTH numbers: q, p, force, lam, four flows of three
-# coefficients, and one run of padding against cache-set conflicts.
-_ROW = 17 * WIDTH
-_FLOWS_AT = 4 * WIDTH
+# Settings advanced side by side: four vectors of eight hide each other's latency.
+_LANES = 32
+# A block's rows that all oscillators share: at every kick the force on the next oscillator, the cubic coefficient, the
+# growth of the forces; then the step, its decay and the last oscillator's position.
+_CUBIC, _GROWTH, _STEP, _DECAY, _CLOSING, _SHARED = (_LANES * row for row in (7, 14, 21, 22, 23, 25))
+# One oscillator's rows: q, p, link into it, link into the next, constant force, shears of q by p, shears of p by q
+# between flows, the pending shear.
+_LINK, _PASS, _CONSTANT, _BY_P, _BY_Q, _PENDING, _ROW = (_LANES * row for row in (2, 3, 4, 5, 9, 13, 14))
 
 _A = (0.0711334264982231177779387300061549964174, 0.241153427956640098736487795326289649618,
       0.521411761772814789212136078067994229991, -0.333698616227678005726562603400438876027)  # fmt: skip
@@ -44,11 +52,10 @@ KICKS = np.array([_B[0], _B[1], _B[2], _B[3], _B[2], _B[1], _B[0]])
 KICK_TIMES = np.cumsum(FLOWS)[:7]
 """When the kicks happen, in steps from the start of the step."""
 
-# The flows that follow the kicks, as indices into the four distinct ones (a2, a3, a4, 2 a1); the last flow
-# of a step is joined with the first of the next.
-_AFTER = _FLOWS_AT + 3 * WIDTH * np.array([0, 1, 2, 2, 1, 0, 3])
+# The flows are a2, a3, a4, a4, a3, a2 and, across the end of a step, twice a1.
 _DISTINCT = np.array([_A[1], _A[2], _A[3], 2 * _A[0]])
 _FIRST = _A[0]
+_B0, _B1, _B2, _B3 = _B
 
 
 class System(NamedTuple):
@@ -81,7 +88,7 @@ def forcing_table(steps: int) -> Floats:
     return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
 
 
-@compiled
+@inlined
 def flow(delta: float, stiffness: float, t: float) -> tuple[float, float, float]:
     """Coefficients (c, s, d) of the damped linear flow over `t` of ``z'' + delta z' + stiffness z = 0``."""
     half = 0.5 * delta
@@ -98,87 +105,186 @@ def flow(delta: float, stiffness: float, t: float) -> tuple[float, float, float]
     return decay, decay * t, 0.0
 
 
-@compiled
-def _apply(work: Floats, h: Floats, delta: float, length: float) -> None:
-    """Flow every oscillator of a block over `length` steps; p is per step."""
-    for at in range(_ROW, len(work), _ROW):
-        row = work[at : at + _ROW]
-        for w in range(WIDTH):
-            c, s, d = flow(delta, 1.0 + row[3 * WIDTH + w], length * h[w])
-            x, y = row[w], row[WIDTH + w] * h[w]
-            row[w] = c * x + s * y
-            row[WIDTH + w] = (c * y - d * x) / h[w]
+@inlined
+def _apply(row: Floats, h: Floats, delta: float, length: float) -> None:
+    """Flow one oscillator of a block over `length` steps; p is per step."""
+    for w in range(_LANES):
+        c, s, d = flow(delta, 1.0 + row[_LINK + w], length * h[w])
+        x, y = row[w], row[_LANES + w] * h[w]
+        row[w] = c * x + s * y
+        row[_LANES + w] = (c * y - d * x) / h[w]
 
 
-@compiled
-def _set_flows(work: Floats, h: Floats, delta: float) -> None:
-    """Write the distinct flows of every oscillator, for p per step (so a kick needs no length)."""
-    for at in range(_ROW, len(work), _ROW):
+@inlined
+def _shears(delta: float, stiffness: float, t: float) -> tuple[float, float]:
+    """The shears (of q by p, of p by q on either side) that make the undamped part of a flow over `t`."""
+    square = stiffness - 0.25 * delta * delta
+    root = math.sqrt(abs(square))
+    if square > 0:
+        return math.sin(root * t) / root, -root * math.tan(0.5 * root * t)
+    if square < 0:
+        return math.sinh(root * t) / root, root * math.tanh(0.5 * root * t)
+    return t, 0.0
+
+
+@inlined
+def _prepare(row: Floats, h: Floats, delta: float) -> None:
+    """Write one oscillator's shears for p per step and unit kicks, and bring its state before the first kick."""
+    along, across = np.empty(4), np.empty(4)
+    for w in range(_LANES):
         for k in range(4):
-            row = work[at + _FLOWS_AT + 3 * k * WIDTH : at + _ROW]
-            for w in range(WIDTH):
-                c, s, d = flow(delta, 1.0 + work[at + 3 * WIDTH + w], _DISTINCT[k] * h[w])
-                row[w], row[WIDTH + w], row[2 * WIDTH + w] = c, s * h[w], d / h[w]
+            along[k], across[k] = _shears(delta, 1.0 + row[_LINK + w], _DISTINCT[k] * h[w])
+            row[_BY_P + k * _LANES + w] = along[k] * h[w]
+        row[_BY_Q + w] = (across[3] + across[0]) / h[w]
+        row[_BY_Q + _LANES + w] = (across[0] + across[1]) / h[w]
+        row[_BY_Q + 2 * _LANES + w] = (across[1] + across[2]) / h[w]
+        row[_BY_Q + 3 * _LANES + w] = 2 * across[2] / h[w]
+        row[_PENDING + w] = across[3] / h[w]
+    _apply(row, h, delta, _FIRST)
+    for w in range(_LANES):
+        row[_LANES + w] -= row[_PENDING + w] * row[w]
 
 
-@compiled
-def _kick_row(row: Floats, previous: Floats, flows: Floats, b: float, beta: float) -> None:
-    # Slices with constant offsets: the only form of several tried that the compiler vectorises fully.
-    for w in range(WIDTH):
+@inlined
+def _share(shared: Floats, delta: float, beta: float) -> None:
+    for w in range(_LANES):
+        half = 0.5 * delta * shared[_STEP + w]
+        for k in range(7):
+            growth = math.exp(half * (KICK_TIMES[k] - KICK_TIMES[0]))
+            shared[_GROWTH + k * _LANES + w] = growth
+            shared[_CUBIC + k * _LANES + w] = -KICKS[k] * beta / (growth * growth)
+        shared[_DECAY + w] = math.exp(-half)
+
+
+@inlined
+def _step_row(row: Floats, shared: Floats) -> None:
+    """One step of one oscillator under the forces in `shared`, which become those on the next."""
+    for w in range(_LANES):
+        x, y, lam = row[w], row[_LANES + w], row[_PASS + w]
+        s0, s1, s2 = row[_BY_P + w], row[_BY_P + _LANES + w], row[_BY_P + 2 * _LANES + w]
+        g0, g1, g2 = row[_BY_Q + w], row[_BY_Q + _LANES + w], row[_BY_Q + 2 * _LANES + w]
+        g3, s3, decay = row[_BY_Q + 3 * _LANES + w], row[_BY_P + 3 * _LANES + w], shared[_DECAY + w]
+        y = (y + _B0 * shared[w]) + (g0 + shared[_CUBIC + w] * (x * x)) * x
+        shared[w] = lam * x
+        x += s0 * y
+        y = (y + _B1 * shared[_LANES + w]) + (g1 + shared[_CUBIC + _LANES + w] * (x * x)) * x
+        shared[_LANES + w] = lam * x
+        x += s1 * y
+        y = (y + _B2 * shared[2 * _LANES + w]) + (g2 + shared[_CUBIC + 2 * _LANES + w] * (x * x)) * x
+        shared[2 * _LANES + w] = lam * x
+        x += s2 * y
+        y = (y + _B3 * shared[3 * _LANES + w]) + (g3 + shared[_CUBIC + 3 * _LANES + w] * (x * x)) * x
+        shared[3 * _LANES + w] = lam * x
+        x += s2 * y
+        y = (y + _B2 * shared[4 * _LANES + w]) + (g2 + shared[_CUBIC + 4 * _LANES + w] * (x * x)) * x
+        shared[4 * _LANES + w] = lam * x
+        x += s1 * y
+        y = (y + _B1 * shared[5 * _LANES + w]) + (g1 + shared[_CUBIC + 5 * _LANES + w] * (x * x)) * x
+        shared[5 * _LANES + w] = lam * x
+        x += s0 * y
+        y = (y + _B0 * shared[6 * _LANES + w]) + (g0 + shared[_CUBIC + 6 * _LANES + w] * (x * x)) * x
+        shared[6 * _LANES + w] = lam * x
+        x += s3 * y
+        row[w], row[_LANES + w] = decay * x, decay * y
+
+
+@inlined
+def _force(shared: Floats, drives: Floats, phases: Floats) -> None:
+    """Forces on the first oscillator at the seven kicks."""
+    for k in range(7):
+        x, y = phases[k, 0], phases[k, 1]
+        force, growth = shared[k * _LANES : (k + 1) * _LANES], shared[_GROWTH + k * _LANES : _GROWTH + (k + 1) * _LANES]
+        for w in range(_LANES):
+            force[w] = growth[w] * (drives[w] + drives[_LANES + w] * x + drives[2 * _LANES + w] * y)
+
+
+@inlined
+def _step_open(shared: Floats, rows: Floats, constants: bool) -> None:
+    """An open chain's oscillators one after the other, each through the whole step."""
+    for at in range(0, len(rows), _ROW):
+        _step_row(rows[at : at + _ROW], shared)
+        if constants and at + _ROW < len(rows):
+            for k in range(7):
+                for w in range(_LANES):
+                    shared[k * _LANES + w] += shared[_GROWTH + k * _LANES + w] * rows[at + _ROW + _CONSTANT + w]
+
+
+@inlined
+def _kick_row(
+    row: Floats, previous: Floats, growth: Floats, cubic: Floats, by_q: Floats, by_p: Floats, b: float
+) -> None:
+    for w in range(_LANES):
         x = row[w]
-        y = row[WIDTH + w] + b * (row[2 * WIDTH + w] + row[3 * WIDTH + w] * previous[w] - beta * x * x * x)
-        c = flows[w]
-        row[w] = c * x + flows[WIDTH + w] * y
-        row[WIDTH + w] = c * y - flows[2 * WIDTH + w] * x
+        force = row[_LINK + w] * previous[w] + growth[w] * row[_CONSTANT + w]
+        y = row[_LANES + w] + b * force + (by_q[w] + cubic[w] * (x * x)) * x
+        row[w], row[_LANES + w] = x + by_p[w] * y, y
 
 
-@compiled
-def _kick_and_flow(work: Floats, after: int, b: float, beta: float) -> None:
-    """One kick of weight `b` and the flow after it, from the last oscillator to the first.
+@inlined
+def _step_ring(shared: Floats, rows: Floats) -> None:
+    """A ring's oscillators together, kick by kick, from the last to the first.
 
-    In this order every oscillator still finds its predecessor where the kick has to see it.
+    In this order every oscillator still finds its predecessor where the kick has to see it; the last one's position,
+    which the first has to see, is put aside.
     """
-    for m in range(len(work) // _ROW - 1, 0, -1):
-        at = m * _ROW
-        _kick_row(
-            work[at : at + 4 * WIDTH], work[at - _ROW : at - _ROW + WIDTH],
-            work[at + after : at + after + 3 * WIDTH], b, beta,
-        )  # fmt: skip
+    last = len(rows) - _ROW
+    for k in range(7):
+        here, after = min(k, 6 - k), 3 if k == 6 else (k if k < 3 else 5 - k)
+        growth = shared[_GROWTH + k * _LANES : _GROWTH + (k + 1) * _LANES]
+        cubic = shared[_CUBIC + k * _LANES : _CUBIC + (k + 1) * _LANES]
+        closing = shared[_CLOSING : _CLOSING + _LANES]
+        for w in range(_LANES):
+            closing[w] = rows[last + w]
+            rows[_CONSTANT + w] = shared[k * _LANES + w] / growth[w]
+        for at in range(last, -1, -_ROW):
+            row = rows[at : at + _ROW]
+            previous = rows[at - _ROW : at - _ROW + _LANES] if at else closing
+            by_q = row[_BY_Q + here * _LANES : _BY_Q + (here + 1) * _LANES]
+            by_p = row[_BY_P + after * _LANES : _BY_P + (after + 1) * _LANES]
+            _kick_row(row, previous, growth, cubic, by_q, by_p, KICKS[k])
+    for at in range(0, len(rows), _ROW):
+        for w in range(_LANES):
+            rows[at + w] *= shared[_DECAY + w]
+            rows[at + _LANES + w] *= shared[_DECAY + w]
 
 
-@compiled
-def _raise_peak(work: Floats, h: Floats, peak: Floats) -> None:
+@inlined
+def _raise_peak(rows: Floats, h: Floats, peak: Floats) -> None:
     """Raise `peak` to the largest z^2 + p^2 of any oscillator; NaN counts as larger than everything."""
-    for at in range(_ROW, len(work), _ROW):
-        for w in range(WIDTH):
-            y = work[at + WIDTH + w] * h[w]
-            square = work[at + w] * work[at + w] + y * y
+    for at in range(0, len(rows), _ROW):
+        row = rows[at : at + _ROW]
+        for w in range(_LANES):
+            y = (row[_LANES + w] + row[_PENDING + w] * row[w]) * h[w]
+            square = row[w] * row[w] + y * y
             peak[w] = peak[w] if square <= peak[w] else square
 
 
-@compiled
+@inlined
 def _run(
-    work: Floats, h: Floats, drives: Floats, system: System, table: Floats, first: int, count: int, peak: Floats
+    shared: Floats, rows: Floats, drives: Floats, system: System, table: Floats, first: int, count: int, peak: Floats
 ) -> None:
     """Advance one block by `count` steps from step `first` of the period; `peak` collects max z^2 + p^2."""
-    _set_flows(work, h, system.delta)
-    _apply(work, h, system.delta, _FIRST)
-    base, cosine, sine = drives[0], drives[1], drives[2]
-    last = len(work) - _ROW
-    force = work[_ROW + 2 * WIDTH : _ROW + 3 * WIDTH]
+    h = shared[_STEP : _STEP + _LANES]
+    _share(shared, system.delta, system.beta)
+    for at in range(0, len(rows), _ROW):
+        _prepare(rows[at : at + _ROW], h, system.delta)
+    constants = False
+    for at in range(_ROW, len(rows), _ROW):
+        for w in range(_LANES):
+            constants = constants or rows[at + _CONSTANT + w] != 0.0
     for step in range(first, first + count):
-        phases = table[step % table.shape[0]]
-        for k in range(7):
-            x, y = phases[k, 0], phases[k, 1]
-            for w in range(WIDTH):
-                force[w] = base[w] + cosine[w] * x + sine[w] * y
-            if system.ring:
-                for w in range(WIDTH):
-                    work[w] = work[last + w]
-            _kick_and_flow(work, _AFTER[k], KICKS[k], system.beta)
+        _force(shared, drives, table[step % table.shape[0]])
+        if system.ring:
+            _step_ring(shared, rows)
+        else:
+            _step_open(shared, rows, constants)
         if step % 8 == 7:
-            _raise_peak(work, h, peak)
-    _apply(work, h, system.delta, -_FIRST)
+            _raise_peak(rows, h, peak)
+    for at in range(0, len(rows), _ROW):
+        row = rows[at : at + _ROW]
+        for w in range(_LANES):
+            row[_LANES + w] += row[_PENDING + w] * row[w]
+        _apply(row, h, system.delta, -_FIRST)
 
 
 @compiled
@@ -190,27 +296,29 @@ def advance_block(
     Parameters
     ----------
     state : float64, shape (N, 2n), all q then all p (p = v + delta/2 z); changed in place.
-    lanes : int64, indices of the settings to advance, WIDTH at a time.
+    lanes : int64, indices of the settings to advance, best a multiple of 32.
     table : `forcing_table` of the steps per period.
     peak : float64, shape (N,), raised to the largest z^2 + p^2 of any oscillator at every eighth step.
     """
     n, total = system.lam.shape[1], len(lanes)
-    constant, drive = system.constant, system.drive
-    work = np.zeros((n + 1) * _ROW)
-    drives, h, high = np.empty((3, WIDTH)), np.empty(WIDTH), np.empty(WIDTH)
-    for start in range(0, total, WIDTH):
-        for w in range(WIDTH):
+    shared, rows = np.zeros(_SHARED), np.zeros(n * _ROW)
+    drives, high = np.empty(3 * _LANES), np.empty(_LANES)
+    for start in range(0, total, _LANES):
+        for w in range(_LANES):
             i = lanes[min(start + w, total - 1)]
-            h[w], high[w] = system.period[i] / table.shape[0], peak[i]
-            drives[0, w], drives[1, w], drives[2, w] = constant[i, 0], drive[i, 0], drive[i, 1]
+            h = system.period[i] / table.shape[0]
+            shared[_STEP + w], high[w] = h, peak[i]
+            drives[w] = system.constant[i, 0]
+            drives[_LANES + w], drives[2 * _LANES + w] = system.drive[i, 0], system.drive[i, 1]
             for m in range(n):
-                at = (m + 1) * _ROW + w
-                work[at], work[at + WIDTH] = state[i, m], state[i, n + m] / h[w]
-                work[at + 2 * WIDTH], work[at + 3 * WIDTH] = constant[i, m], system.lam[i, m]
-        _run(work, h, drives, system, table, first, count, high)
-        for w in range(min(WIDTH, total - start)):
+                at = m * _ROW + w
+                rows[at], rows[at + _LANES] = state[i, m], state[i, n + m] / h
+                rows[at + _LINK], rows[at + _CONSTANT] = system.lam[i, m], system.constant[i, m] if m else 0.0
+                rows[at + _PASS] = system.lam[i, m + 1] if m + 1 < n else 0.0
+        _run(shared, rows, drives, system, table, first, count, high)
+        for w in range(min(_LANES, total - start)):
             i = lanes[start + w]
             peak[i] = high[w]
             for m in range(n):
-                at = (m + 1) * _ROW + w
-                state[i, m], state[i, n + m] = work[at], work[at + WIDTH] * h[w]
+                at = m * _ROW + w
+                state[i, m], state[i, n + m] = rows[at], rows[at + _LANES] * shared[_STEP + w]

@@ -22,37 +22,44 @@ HALVINGS = 24
 
 @dataclass(frozen=True)
 class Cubic:
-    """``p(v) = v ((kappa + sign v)^2 + g^2) = c`` with v = 3/4 |A|^2, kappa = k - omega^2, g = delta omega.
+    """``p(v) = v ((kappa + sign v)^2 + g^2) = c`` with v = 3/4 strength |A|^2, kappa = k - omega^2, g = delta omega.
 
-    c = 3/4 |F|^2. One or three roots; with three, the middle one is unstable. All arrays float64, shape (N,),
-    sign -1.0 or 1.0.
+    c = 3/4 strength |F|^2. One or three roots; with three, the middle one is unstable. All arrays float64, shape (N,),
+    sign (of beta) and strength (|beta|, scaled) the same or shape (1,).
 
     `peak`, `dip` : v at the local maximum and minimum of p (the two folds) where `folded`, else 0.
     """
 
     kappa: Floats
     g: Floats
-    sign: float
+    sign: Floats
+    strength: Floats
     c: Floats
     folded: Bools
     peak: Floats
     dip: Floats
 
     @classmethod
-    def of(cls, kappa: Floats, g: Floats, sign: float, force: Complexes) -> Cubic:
+    def of(cls, kappa: Floats, g: Floats, beta: Floats | float, force: Complexes) -> Cubic:
         """The cubic under a force of complex amplitude `force`, shape (N,)."""
-        c = 0.75 * (force.real * force.real + force.imag * force.imag)
+        each = np.atleast_1d(np.asarray(beta, dtype=np.float64))
+        sign, strength = np.sign(each), np.abs(each)
+        c = 0.75 * strength * (force.real * force.real + force.imag * force.imag)
         bend = -sign * kappa
         spread = kappa * kappa - 3 * g * g
         folded = (bend > 0) & (spread > 0)
         if not folded.any():
             none = np.zeros(kappa.shape)
-            return cls(kappa, g, sign, c, folded, none, none)
+            return cls(kappa, g, sign, strength, c, folded, none, none)
         root = np.sqrt(np.where(folded, spread, 0.0))
         # The smaller critical point by Vieta, which does not cancel: peak * dip = (kappa^2 + g^2) / 3.
         dip = np.where(folded, (2 * bend + root) / 3, 0.0)
         peak = np.where(folded, (kappa * kappa + g * g) / np.where(folded, 3 * dip, 1.0), 0.0)
-        return cls(kappa, g, sign, c, folded, peak, dip)
+        return cls(kappa, g, sign, strength, c, folded, peak, dip)
+
+    def measure(self, phasor: Complexes) -> Floats:
+        """v of the amplitude |phasor|."""
+        return 0.75 * self.strength * (phasor.real * phasor.real + phasor.imag * phasor.imag)
 
     def value(self, v: Floats) -> Floats:
         """p(v)."""
@@ -112,7 +119,7 @@ class Cubic:
 
     def _newton_of_one(self, v: float) -> float:
         """The same for one setting alone, where a NumPy call costs more than the arithmetic."""
-        kappa, gg, c, sign = float(self.kappa[0]), float(self.g[0]) ** 2, float(self.c[0]), self.sign
+        kappa, gg, c, sign = float(self.kappa[0]), float(self.g[0]) ** 2, float(self.c[0]), float(self.sign[0])
         for _ in range(MAX_STEPS):
             stiff = kappa + sign * v
             slope = stiff * (stiff + 2 * sign * v) + gg
@@ -126,22 +133,24 @@ class Cubic:
 
 
 def mean_starts(
-    kappa: Floats, g: Floats, k: Floats, sign: float, force: Complexes, constant: Floats
+    kappa: Floats, g: Floats, k: Floats, sign: Floats, force: Complexes, constant: Floats
 ) -> tuple[Complexes, Floats]:
     """Starts (phasor, mean) of an oscillator under a constant force, both of shape (3, N), NaN where fewer.
 
     For a given y = |A|^2 the mean c solves ``c (k + 3/2 sign y + sign c^2) = constant`` and the first harmonic sees
-    ``kappa + 3 sign c^2 + 3/4 sign y - 9/2 c^2 y / D`` with the second harmonic's impedance D slaved to it
-    (sign^2 = 1). Sign changes of the amplitude equation over a scan of y are the starts.
+    ``kappa + 3 sign c^2 + 3/4 sign y - 9/2 sign^2 c^2 y / D`` with the second harmonic's impedance D slaved to it.
+    Sign changes of the amplitude equation over a scan of y are the starts.
     """
-    c34 = 0.75 * np.abs(force) ** 2
-    top = (np.abs(kappa) + np.cbrt(c34)) / 0.75
+    strength = np.abs(sign)
+    c34 = 0.75 * strength * np.abs(force) ** 2
+    linear = np.abs(force) ** 2 / (kappa**2 + g**2)
+    top = np.where(strength > 0, (np.abs(kappa) + np.cbrt(c34)) / (0.75 * strength), linear)
     omega2 = k - kappa
 
     def equation(y: Floats) -> tuple[Floats, Floats, Floats]:
         mean = mean_of(k + 1.5 * sign * y, sign, constant)
         second = k + 3 * sign * mean**2 + 1.5 * sign * y - 4 * omega2
-        stiff = kappa + 3 * sign * mean**2 + 0.75 * sign * y - 4.5 * mean**2 * y / second
+        stiff = kappa + 3 * sign * mean**2 + 0.75 * sign * y - 4.5 * (sign * mean) ** 2 * y / second
         return y * (stiff**2 + g**2) - np.abs(force) ** 2, stiff, mean
 
     fractions = np.linspace(0.0, 1.05, SCAN)[:, None] ** 3
@@ -166,7 +175,7 @@ def mean_starts(
     return phasors, means
 
 
-def mean_of(stiffness: Floats, sign: float, constant: Floats) -> Floats:
+def mean_of(stiffness: Floats, sign: Floats, constant: Floats) -> Floats:
     """Root of ``c (stiffness + sign c^2) = constant`` that grows from 0 with it; NaN past its fold."""
     c = np.zeros(np.broadcast_shapes(stiffness.shape, constant.shape))
     for _ in range(MAX_STEPS):

@@ -10,8 +10,7 @@ from .answer import Answer, defect, outcomes, response_of
 from .basis import basis_for
 from .branches import all_branches
 from .chain import Chain, Setting
-from .harmonic_balance import open_refusal
-from .march import march
+from .harmonic_balance import branch_refusal, lower_branch
 from .response import Outcome, Response, Stats
 from .rung import Rung, Start
 from .scaling import Stages
@@ -31,22 +30,22 @@ class StaticRung(Rung):
     valid = "bias and preload only"
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
-        """Open chains only; every branch only of one setting."""
-        return open_refusal(chain, setting, start)
+        """Every branch only of one setting, and only where oscillators can be solved in turn."""
+        return branch_refusal(chain, setting, start)
 
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
         """The equilibrium that grows from rest, or every equilibrium (all)."""
         began = time.perf_counter()
         stages = Stages.of(chain, setting)
         basis = basis_for(0, True)
-        found = all_branches(stages, basis) if start is Start.ALL else march(stages, basis)
+        found = all_branches(stages, basis) if start is Start.ALL else lower_branch(stages, basis, Start.REST)
         if start is Start.ALL:
             stages = stages.pick(np.zeros(len(found.ok), dtype=np.intp))
         outcome = outcomes(len(stages), Outcome.OK)
         if start is not Start.ALL:
             # Newton from 0 climbs to the equilibrium in the well and finds none, or one outside it, past the fold.
             held = (stages.k + 3 * stages.sign * found.x[:, 0] ** 2 > 0).all(axis=0)
-            outcome[~(found.ok & held)] = Outcome.ESCAPED if stages.sign < 0 else Outcome.NO_CONVERGENCE
+            outcome[~(found.ok & held)] = Outcome.ESCAPED if stages.softens else Outcome.NO_CONVERGENCE
         answer = Answer(basis, found.x, outcome, found.branch, defect(stages, basis, found.x))
         work = Stats(newton_steps=found.steps, oscillators_solved=stages.n * len(stages))
         return response_of(stages, self.name, answer, work, began)

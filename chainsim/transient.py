@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .network import advance_network
 from .response import Outcome
 from .scaled import Problem, in_threads
-from .shooting import shoot
+from .shooting import FAR_SMALLER, shoot
 from .splitting import WIDTH, advance_block, forcing_table
 
 __all__ = ["Settled", "settle"]
@@ -25,6 +26,7 @@ _SHRINKS = 0.98  # Between two looks a decaying distance falls by more.
 _DRIFTS = 1e-5  # Change over one period, relative, that is motion and not the tail of a slow decay.
 _RESTS = 1e-6  # Change over one period, relative, of an oscillator that has come to rest.
 _STRONG = 0.05  # z^2 beyond which eight steps per period are too few to trust a verdict.
+_MOST_KICKS = 1_000_000_000  # Of one setting; about ten seconds.
 _MOST_STEPS = 8192  # Steps per period beyond which a setting counts as out of budget.
 
 
@@ -53,17 +55,18 @@ def settle(problem: Problem, max_periods: int) -> Settled:
     """Integrate every setting from rest until its outcome is sure, for at most `max_periods` periods each.
 
     A linear chain needs no integration: its only orbit attracts everything or nothing. Settings whose motion
-    is strongly nonlinear are decided again with four times the steps.
+    is strongly nonlinear are decided again with four times the steps that their swings at that amplitude need.
     """
     run = _Run(problem, max_periods)
     steps = problem.coarse_steps
     for value in np.unique(steps[steps <= _MOST_STEPS]):
-        decide = run.decide_linear if problem.beta == 0 else run.decide
+        decide = run.decide_linear if problem.linear else run.decide
         decide(np.flatnonzero(steps == value), int(value))
-    if problem.beta != 0:
+    if not problem.linear:
         strong = ~(run.peak <= _STRONG) & (steps <= _MOST_STEPS)
-        for value in np.unique(steps[strong]):
-            run.decide(np.flatnonzero(strong & (steps == value)), 4 * int(value))
+        again = np.minimum(4 * problem.steps_at(run.peak), _MOST_STEPS)
+        for value in np.unique(again[strong]):
+            run.decide(np.flatnonzero(strong & (again == value)), int(value))
     return Settled(run.outcome, run.steps, run.state, run.phasor, run.periods, run.turns, run.kicks)
 
 
@@ -86,13 +89,16 @@ class _Run:
         self.outcome[lanes], self.steps[lanes] = Outcome.OUT_OF_BUDGET, steps
         self.state[lanes], self.peak[lanes] = 0.0, 0.0
         self.orbit[lanes], self.distance[lanes], self.phasor[lanes] = np.nan, np.inf, np.nan
-        rate = 0.5 * self.problem.delta * float(np.min(self.problem.period[lanes]))
-        pace = int(np.clip(1.0 / rate if rate > 0 else np.inf, 8, max(self.max_periods // 16, 8)))
-        # Transients of n stages in cascade die like t^(n-1) e^(-rate t).
-        patience = (20 + 4 * self.problem.n) / rate if rate > 0 else np.inf
+        rate = 0.5 * float(np.min(self.problem.network.delta)) * float(np.min(self.problem.period[lanes]))
+        pace = int(np.clip(1.0 / rate if rate > 0 else np.inf, 4, max(self.max_periods // 16, 4)))
+        # Transients of n stages in cascade die like t^(n-1) e^(-rate t). Fed forward, beats that stay are rare,
+        # and what looks like one may be a slow passage by the ghost of a fold: that is given three times as long.
+        folds = (20 + 4 * self.problem.n) * (1 if self.problem.joint else 3)
+        patience = folds / rate if rate > 0 else np.inf
         table, history, done = forcing_table(steps), _History(self.problem), 0
-        while len(lanes) and done < self.max_periods:
-            go = min(max(pace, int(0.15 * done)), self.max_periods - done)
+        most = min(self.max_periods, max(1, _MOST_KICKS // (7 * steps * self.problem.n)))
+        while len(lanes) and done < most:
+            go = min(max(pace, int(0.15 * done)), most - done)
             changes = self._advance(lanes, table, go)
             done += go
             history.add(done, lanes, changes)
@@ -113,31 +119,35 @@ class _Run:
 
     def _advance(self, lanes: Lanes, table: Floats, periods: int) -> Floats:
         """Advance by whole periods; each oscillator's relative change over the last one, shape (L, n)."""
-        problem, steps, system = self.problem, len(table), self.problem.system
+        problem, steps = self.problem, len(table)
 
         def move(count: int) -> None:
             def work(part: slice) -> None:
-                advance_block(self.state, lanes[part], system, table, 0, count * steps, self.peak)
+                if problem.plain:
+                    advance_block(self.state, lanes[part], problem.system, table, 0, count * steps, self.peak)
+                else:
+                    advance_network(self.state, lanes[part], problem.network, table, 0, count * steps, self.peak)
 
-            in_threads(work, len(lanes), WIDTH)
+            in_threads(work, len(lanes), WIDTH if problem.plain else 1)
 
         move(periods - 1)
         before = self.state[lanes]
         move(1)
         self.periods += periods * len(lanes)
         self.kicks += 7 * steps * periods * len(lanes) * problem.n
-        return _distances(before, self.state[lanes], joint=problem.ring)
+        return _distances(before, self.state[lanes], joint=problem.joint)
 
     def _look(self, lanes: Lanes, steps: int, history: _History, patient: bool) -> Lanes:
         """Settle what can be settled now; returns the settings that go on."""
-        escaped = ~(self.peak[lanes] <= self.problem.escape**2)
-        self.outcome[lanes[escaped]] = Outcome.ESCAPED
+        escaped = ~(np.sqrt(self.peak[lanes]) <= self.problem.escape)
+        # What cannot run away has outrun the steps.
+        self.outcome[lanes[escaped]] = Outcome.NO_CONVERGENCE if self.problem.bounded else Outcome.ESCAPED
         lanes = lanes[~escaped]
         quiet = np.full_like(lanes, True, dtype=np.bool_) if patient else history.change(lanes) < _QUIET
         restless, lanes = lanes[~quiet], lanes[quiet]
         orbits = shoot(self.problem, lanes, self.state[lanes], steps)
         self.turns += orbits.turns
-        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.problem.ring))
+        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.problem.joint))
         distance = np.where(orbits.stable, away, np.inf)
         same = _worst(_distances(self.orbit[lanes], orbits.state)) < _SAME
         nearing = same & (distance < np.maximum(_SHRINKS * self.distance[lanes], _SAME))
@@ -153,7 +163,7 @@ class _History:
     """What every look saw, to tell recurrent motion from decay."""
 
     def __init__(self, problem: Problem) -> None:
-        self._ring, self._shape = problem.ring, (len(problem), problem.n)
+        self._joint, self._shape = problem.joint, (len(problem), problem.n)
         self._looks: list[tuple[int, Floats]] = []
 
     def add(self, done: int, lanes: Lanes, changes: Floats) -> None:
@@ -177,7 +187,7 @@ class _History:
         then = next(seen for at, seen in reversed(self._looks) if at <= done / 2 or at == self._looks[0][0])[lanes]
         now = self._looks[-1][1][lanes]
         moving: Bools = (np.max(now, axis=1) > _DRIFTS) & (np.max(now, axis=1) > 0.5 * np.max(then, axis=1))
-        return moving if self._ring else moving & (_settled_head(now) <= _settled_head(then))
+        return moving if self._joint else moving & (_settled_head(now) <= _settled_head(then))
 
 
 def _settled_head(changes: Floats) -> Lanes:
@@ -196,12 +206,15 @@ def _distances(a: Floats, b: Floats, *, joint: bool = False) -> Floats:
 
     With `joint` it is relative to the largest oscillator's size: in a ring a transient runs round through
     oscillators that will be a thousand times smaller, and their own size would hide its decay.
+
+    No size counts as smaller than 1e-9 of the largest: far down a chain the rounding of the first oscillators, ringing
+    at a resonance of every stage, is larger than the motion itself.
     """
     n = a.shape[1] // 2
     size = np.hypot(b[:, :n], b[:, n:])
-    if joint:
-        size = np.broadcast_to(np.max(size, axis=1, keepdims=True, initial=0.0), size.shape)
+    size = np.maximum(size, (1.0 if joint else FAR_SMALLER) * np.max(size, axis=1, keepdims=True, initial=0.0))
     with np.errstate(invalid="ignore"):
         apart = np.hypot(a[:, :n] - b[:, :n], a[:, n:] - b[:, n:])
     nothing = np.where((apart == 0) & (size == 0), 0.0, np.inf)
-    return np.divide(apart, size, out=nothing, where=(size > 0) & np.isfinite(apart) & np.isfinite(size))
+    found: Floats = np.divide(apart, size, out=nothing, where=(size > 0) & np.isfinite(apart) & np.isfinite(size))
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -98,14 +99,23 @@ def _lines(root: yaml.Node | None) -> dict[Place, int]:
 
 
 def _model_complaint(name: str, lines: dict[Place, int], error: ValidationError) -> str:
-    first = error.errors(include_url=False)[0]
-    place = tuple(first["loc"])
+    complaints = [(_place(each["loc"]), each) for each in error.errors(include_url=False)]
+    # Where a number or a list fits, both complain: the one that points into the list knows more.
+    top = complaints[0][0]
+    place, first = max((one for one in complaints if one[0][: len(top)] == top), key=lambda one: len(one[0]))
     known = place
     while known and known not in lines:
         known = known[:-1]
     field = ".".join(str(part) for part in place) or "file"
     return f"{name}:{lines.get(known, 1)}: {field}: {_sentence(first)}"
 
+
+def _place(location: Place) -> Place:
+    """Keys and items, without the names of the types a value was tried as."""
+    return tuple(part for part in location if isinstance(part, int) or not _TYPE_NAME.fullmatch(part))
+
+
+_TYPE_NAME = re.compile(r"(constrained-)?(float|int|str)|list\[.*\]")
 
 _EXPECTED = {
     "missing": "this key is required and missing",

@@ -6,10 +6,12 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from .errors import AppError
+
 if TYPE_CHECKING:
     from encoders import TextOptions
 
-__all__ = ["Dots", "Presentation", "SampleFormat", "Undefined", "text_options"]
+__all__ = ["Dots", "Presentation", "SampleFormat", "Undefined", "place_of", "text_options"]
 
 
 class Undefined(StrEnum):
@@ -63,3 +65,19 @@ def text_options(**given: Any) -> TextOptions:
     if "dots" in chosen:
         chosen["dots"] = None if chosen["dots"] is Dots.AUTO else int(chosen["dots"].value)
     return replace(TextOptions(), **chosen)
+
+
+def place_of(words: str | None) -> tuple[int, int] | None:
+    """An actuator given as ``ROW,COL``, counted from 0.
+
+    Raises
+    ------
+    AppError
+        When it is not two whole numbers.
+    """
+    if words is None:
+        return None
+    parts = words.split(",")
+    if len(parts) != 2 or not all(part.strip().isdecimal() for part in parts):
+        raise AppError(f"actuator: expected ROW,COL such as 2,3, got {words!r}")
+    return int(parts[0]), int(parts[1])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from chainsim import Device, Outcome, load_device
-from drivers import Encoding, WrittenWaveform, write_waveform
+from drivers import EXCHANGE_SUFFIXES, Encoding, WrittenWaveform, write_exchange, write_waveform
 from encoders import EncodingReport, GridShape, TextFrames, TextOptions, TextScene, encode_text
 from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
@@ -32,6 +32,7 @@ def render_text(
     options: TextOptions,
     encoding: Encoding,
     contrast_db: float = DEFAULT_CONTRAST_DB,
+    actuator: tuple[int, int] | None = None,
 ) -> TextReport:
     """Encode text, plan it on a device and, with `out`, write the waveform.
 
@@ -40,7 +41,9 @@ def render_text(
 
     Parameters
     ----------
-    source : a file, ``-``, or the text itself. device : profile name or file. out : the .wav.
+    source : a file, ``-``, or the text itself. device : profile name or file.
+    out : samples (.wav, .npz, .csv, .raw) or a haptic file (.hjif, .ahap, .haptic).
+    actuator : (row, col) that an .ahap or .haptic shows; None is the mean over the grid.
     contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
 
     Raises
@@ -61,10 +64,16 @@ def render_text(
                     update(frame.end_s)
             else:
                 plan = replace(watch.plan, frames=watch)
-                written = write_waveform(plan, out, encoding=encoding, progress=update)
+                if out.suffix.lower() in EXCHANGE_SUFFIXES:
+                    write_exchange(plan, out, actuator=actuator)
+                else:
+                    written = write_waveform(plan, out, encoding=encoding, progress=update)
         except _CannotBeMade:
             pass
-    return replace(_report(profile, scene, watch, written), seconds=time.perf_counter() - began)
+    report = _report(profile, scene, watch, written)
+    if out is not None and written is None and report.ok:
+        report = replace(report, files=(str(out),))
+    return replace(report, seconds=time.perf_counter() - began)
 
 
 class _CannotBeMade(Exception):

@@ -13,7 +13,7 @@ from .limits import LimitCheck
 from .manifest import FrameMark, Manifest
 from .manifest_reader import read_manifest
 from .pair import WrittenWaveform, read_waveform, write_waveform
-from .samples import SUFFIXES, SampleReader, SampleWriter
+from .samples import EXCHANGE_SUFFIXES, SUFFIXES, SampleReader, SampleWriter
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
 from .waveform import Waveform
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .controller import VirtualController
     from .drv2667 import BoardRefusal
     from .emulator import Emulator, EmulatorStatus
+    from .exchange import read_exchange, write_exchange
     from .faults import Faults, FaultyLine, Window
     from .felt import FeltGrid
     from .gate import GateLimits, GateRefusal, GateReport, pass_gate
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BOARD_BAUD",
+    "EXCHANGE_SUFFIXES",
     "SUFFIXES",
     "Ack",
     "ArrivalRecorder",
@@ -104,11 +106,13 @@ __all__ = [
     "plan_board",
     "play_audio",
     "play_grid_lines",
+    "read_exchange",
     "read_manifest",
     "read_waveform",
     "run_session",
     "serial_ports",
     "session_messages",
+    "write_exchange",
     "write_waveform",
 ]
 
@@ -125,6 +129,8 @@ _LATE = {
     "ControllerRefused": "stream",
     "ControllerSpec": "playout",
     "Emulator": "emulator",
+    "read_exchange": "exchange",
+    "write_exchange": "exchange",
     "EmulatorStatus": "emulator",
     "Faults": "faults",
     "FaultyLine": "faults",

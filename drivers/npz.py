@@ -73,8 +73,8 @@ class NpzReader:
     channels: int
 
     @classmethod
-    def open(cls, path: Path, channels: int) -> NpzReader:
-        """Read the headers of `path`.
+    def open(cls, path: Path, channels: Sequence[Channel], _rate_hz: int) -> NpzReader:
+        """Read the headers of `path`; the rate stands in the file.
 
         Raises
         ------
@@ -91,9 +91,9 @@ class NpzReader:
                     rate = np.lib.format.read_array(io.BytesIO(member.read(4096)), allow_pickle=False)
         except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError) as error:
             raise UnreadableWaveform(f"{path}: not an NPZ with volts and rate_hz: {error}") from None
-        if len(shape) != 2 or shape[1] != channels or rate.shape != () or rate.dtype.kind not in "iu":
-            raise UnreadableWaveform(f"{path}: expected volts of {channels} channels and a whole rate_hz")
-        return cls(path, int(rate), shape[0], channels)
+        if len(shape) != 2 or shape[1] != len(channels) or rate.shape != () or rate.dtype.kind not in "iu":
+            raise UnreadableWaveform(f"{path}: expected volts of {len(channels)} channels and a whole rate_hz")
+        return cls(path, int(rate), shape[0], len(channels))
 
     def blocks(self, block: int) -> Iterator[Floats]:
         """The samples from the start, float64, shape (S, channels), volts.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
@@ -10,14 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .channels import Channel
-from .csv_samples import CsvReader, CsvWriter
 from .errors import FileError, WaveformError
-from .npz import NpzReader, NpzWriter
-from .raw import RawReader, RawWriter
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
 
-__all__ = ["SUFFIXES", "SampleReader", "SampleWriter", "check_suffix", "open_samples", "writer_for"]
+__all__ = [
+    "EXCHANGE_SUFFIXES",
+    "SUFFIXES",
+    "SampleReader",
+    "SampleWriter",
+    "check_suffix",
+    "open_samples",
+    "writer_for",
+]
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +34,12 @@ SUFFIXES = {
     ".raw": "float32 of full scale, little-endian, channels interleaved, no header",
 }
 """Ending of the name -> what the format is for and what it loses."""
+
+EXCHANGE_SUFFIXES = (".hjif", ".ahap", ".haptic")
+"""Endings of haptic files, which carry no samples (`drivers.exchange`)."""
+
+# Imported only for a file of theirs: a short text is written in less time than their imports take.
+OTHERS = {".npz": (".npz", "Npz"), ".csv": (".csv_samples", "Csv"), ".raw": (".raw", "Raw")}
 
 
 class SampleWriter(Protocol):
@@ -77,7 +89,7 @@ def check_suffix(path: Path) -> str:
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise FileError(f"{path}: expected a name that ends in {', '.join(SUFFIXES)}")
+        raise FileError(f"{path}: expected a name that ends in {', '.join((*SUFFIXES, *EXCHANGE_SUFFIXES))}")
     return suffix
 
 
@@ -96,9 +108,9 @@ def writer_for(
         return WavWriter(file, channels, rate_hz, encoding)
     if encoding != "float32":
         raise WaveformError(f"{path}: {encoding} is an encoding of .wav; leave it out, or write a .wav")
-    if suffix == ".npz":
-        return NpzWriter(file, channels, rate_hz)
-    return (CsvWriter if suffix == ".csv" else RawWriter)(file, channels, rate_hz)
+    module, name = OTHERS[suffix]
+    writer: SampleWriter = getattr(import_module(module, __package__), f"{name}Writer")(file, channels, rate_hz)
+    return writer
 
 
 def open_samples(path: Path, channels: Sequence[Channel], rate_hz: int) -> SampleReader:
@@ -112,6 +124,6 @@ def open_samples(path: Path, channels: Sequence[Channel], rate_hz: int) -> Sampl
     suffix = check_suffix(path)
     if suffix == ".wav":
         return WavReader.open(path, [channel.volts_per_unit for channel in channels])
-    if suffix == ".npz":
-        return NpzReader.open(path, len(channels))
-    return (CsvReader if suffix == ".csv" else RawReader).open(path, channels, rate_hz)
+    module, name = OTHERS[suffix]
+    reader: SampleReader = getattr(import_module(module, __package__), f"{name}Reader").open(path, channels, rate_hz)
+    return reader

@@ -117,8 +117,8 @@ def test_auto_from_rest_agrees_with_integration_where_it_did_not_integrate():
 def test_refusals_name_the_cure():
     ring = Chain(6, 0.01, -1.0, Closure.RING)
     setting = Setting.of(ring, epsilon=1e-3, lam=0.01, omega=1.0)
-    with pytest.raises(RungError, match="use rung ode or auto"):
-        solve(ring, setting, tol=1e-6, rung="harmonic_balance")
+    with pytest.raises(RungError, match="use start rest or ramp"):
+        solve(ring, setting, tol=1e-6, rung="harmonic_balance", start="all")
     two = Setting.of(CHAIN, epsilon=[1e-3, 2e-3], lam=0, omega=1.0)
     with pytest.raises(RungError, match="one setting, got 2"):
         solve(CHAIN, two, tol=1e-6, rung="one_harmonic", start="all")

@@ -23,7 +23,7 @@ def smooth(samples, shape, *, seed=0, size=0.05):
     return force, lam
 
 
-def by_dop853(force, lam, *, delta, beta, ring, dtau):
+def by_dop853(force, lam, *, delta, beta, ring, dtau, own=1.0):
     """z at the samples of one chain, shape (S, n), an interval at a time."""
     n = force.shape[1]
     lam = lam.copy()
@@ -38,7 +38,7 @@ def by_dop853(force, lam, *, delta, beta, ring, dtau):
             drive = (1 - part) * force[k] + part * force[k + 1]
             links = (1 - part) * lam[k] + part * lam[k + 1]
             z, v = y[:n], y[n:]
-            return np.concatenate([v, drive - delta * v - z - beta * z**3 + links * (np.roll(z, 1) - z)])
+            return np.concatenate([v, drive - delta * v - own * z - beta * z**3 + links * (np.roll(z, 1) - z)])
 
         y = solve_ivp(slope, (0, dtau), y, method="DOP853", rtol=1e-12, atol=1e-16).y[:, -1]
         found.append(y[:n])
@@ -79,6 +79,30 @@ def test_blocks_do_not_matter(lengths, ring):
     parts, pieces = grid((5, 8), 2, ring=ring), np.cumsum(lengths)[:-1]
     cut = [parts.advance(f, x) for f, x in zip(np.split(force, pieces), np.split(lam, pieces), strict=True)]
     np.testing.assert_array_equal(np.concatenate(cut), whole)
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_unequal_actuators_agree_with_dop853(ring):
+    force, lam = smooth(200, (2, 6), size=0.02)
+    rng = np.random.default_rng(6)
+    delta, beta, own = (rng.uniform(low, high, (2, 6)) for low, high in ((0.01, 0.05), (-1.5, 1), (0.9, 1.2)))
+    here = GridIntegrator(shape=(2, 6), chain_length=3, delta=delta, beta=beta, stiffness=own, ring=ring, dtau=0.2)
+    z = here.advance(force, lam)
+    for row, first in ((0, 0), (1, 3)):
+        at = (row, slice(first, first + 3))
+        wanted = by_dop853(force[:, *at], lam[:, *at], delta=delta[at], beta=beta[at], ring=ring, dtau=0.2, own=own[at])
+        assert np.max(np.abs(z[:, *at] - wanted)) < 1e-7 * np.max(np.abs(wanted))
+
+
+def test_equal_actuators_may_be_given_one_by_one():
+    force, lam = smooth(200, (2, 6))
+    plain = grid((2, 6), 3).advance(force, lam)
+    alike = {"delta": np.full((2, 6), 0.02), "beta": np.full((2, 6), -1.0), "stiffness": np.ones((2, 6))}
+    each = GridIntegrator(shape=(2, 6), chain_length=3, ring=False, dtau=0.2, **alike)
+    np.testing.assert_array_equal(each.advance(force, lam), plain)
+    alike["stiffness"][1, 5] += 1e-12
+    each = GridIntegrator(shape=(2, 6), chain_length=3, ring=False, dtau=0.2, **alike)
+    np.testing.assert_allclose(each.advance(force, lam), plain, atol=1e-11)
 
 
 def test_constant_links_are_links_that_stay():
@@ -166,6 +190,10 @@ def test_bad_input_is_refused_by_name():
         grid(dtau=0.0)
     with pytest.raises(GridError, match="beta"):
         grid(beta=np.nan)
+    with pytest.raises(GridError, match=r"delta: expected a number or shape \(1, 3\), got \(3,\)"):
+        grid(delta=np.full(3, 0.1))
+    with pytest.raises(GridError, match="delta: expected numbers >= 0, got -1"):
+        grid(delta=-1.0)
     with pytest.raises(GridError, match=r"force: expected shape \(4, 1, 3\)"):
         grid().advance(force[:, :, :2], lam)
     with pytest.raises(GridError, match=r"lam: expected shape"):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import Branch, Chain, Outcome, Setting
+from chainsim import Branch, Chain, Outcome, Setting, solve
 from chainsim.ode import OdeRung, reached_from_rest, steady_from_rest
 from chainsim.rung import RungError, Start
 
@@ -243,3 +243,13 @@ def test_impossible_requests_are_refused():
         steady_from_rest(PAPER, setting, tol=1e-14, max_periods=100)
     with pytest.raises(RungError, match="max_periods"):
         steady_from_rest(PAPER, setting, tol=1e-6, max_periods=0)
+
+
+def test_a_slow_passage_by_the_ghost_of_a_fold_is_not_a_beat():
+    """An open chain that hesitates for about 40,000 tau before it settles on its only answer."""
+    chain = PAPER
+    setting = Setting.of(chain, epsilon=2.7524447e-4, lam=0.010, omega=1.0)
+    found = steady_from_rest(chain, setting, tol=1e-8, max_periods=60_000)
+    assert found.outcome[0] is Outcome.OK
+    only = solve(chain, setting, tol=1e-8, rung="harmonic_balance", start="rest")
+    np.testing.assert_allclose(found.phasor, only.phasor, atol=1e-7)

@@ -94,15 +94,59 @@ def test_complaints_name_the_place(old, new, complaint):
     assert "\n" not in str(caught.value)
 
 
-def test_grids_are_refused_in_one_sentence():
-    with pytest.raises(ProfileError, match="grid: a 2-D grid"):
-        parse_simulation(TEXT.replace("chain:   {n: 6,", "grid: {rows: 6, cols: 6}\nchain:   {n: 6,"), "c.yaml")
-    with pytest.raises(ProfileError, match="grid: a 2-D grid"):
-        parse_simulation("grid: {rows: 6, cols: 6}\nsetting: {epsilon: 1, omega: 1}\ntol: 1e-6\n", "c.yaml")
+GRID = {"grid": {"rows": 2, "cols": 3}, "delta": 0.05, "beta": -1.0}
+
+
+def test_a_grid():
+    spec = {**SPEC, "chain": GRID, "setting": {"epsilon": 0.01, "lam_x": 0.1, "lam_y": 0.2, "omega": 1.1}}
+    answer = simulate(spec)
+    assert list(answer) == KEYS
+    assert answer["outcome"] == "ok"
+    assert len(answer["phasor"]) == 6
+    each = {**spec["setting"], "lam_x": [[0.1, 0.1], [0.1, 0.1]], "lam_y": [[0.2, 0.2, 0.2]]}
+    assert simulate({**spec, "setting": each})["phasor"] == answer["phasor"]
+    # Lower left and upper right differ by the two links; the paths to the lower right end add up.
+    assert answer["phasor"][3] != answer["phasor"][1]
+    alike = {"epsilon": 0.01, "lam": 0.1, "omega": 1.1}
+    assert simulate({**spec, "setting": alike})["phasor"][3] == pytest.approx(
+        simulate({**spec, "setting": alike})["phasor"][1]
+    )
+
+
+def test_unequal_oscillators_both_ways_and_amplifiers():
+    spec = {**SPEC, "chain": {"n": 3, "delta": [0.05, 0.06, 0.05], "beta": -1.0, "stiffness": [1.0, 1.01, 0.99]}}
+    spec["setting"] = {"epsilon": 0.01, "lam": [0.1, 0.2], "omega": 1.1}
+    plain, two_way, amplified = (
+        simulate({**spec, "chain": {**spec["chain"], **more}})
+        for more in ({}, {"closure": "bidirectional"}, {"kind": "amplifier"})
+    )
+    assert plain["outcome"] == two_way["outcome"] == amplified["outcome"] == "ok"
+    assert len({str(answer["phasor"]) for answer in (plain, two_way, amplified)}) == 3
+
+
+@pytest.mark.parametrize(
+    ("chain", "setting", "complaint"),
+    [
+        ({"delta": 0.1, "beta": -1.0}, {}, "chain: give either n, the length of a chain, or grid"),
+        ({**GRID, "n": 6}, {}, "chain: give either n"),
+        ({**GRID, "delta": [0.1]}, {}, "chain: chain.delta: expected a number or a list of 6"),
+        ({**GRID, "closure": "ring"}, {}, "chain: chain.closure: a grid is open"),
+        ({**GRID, "closure": "knot"}, {}, "chain.closure: expected 'open', 'ring' or 'bidirectional', got 'knot'"),
+        ({**GRID, "delta": "high"}, {}, "chain.delta: expected a number"),
+        ({"n": 6, "delta": 0.1, "beta": -1.0}, {"lam_x": 0.1}, "setting: setting.lam_x, lam_y: these are the links of"),
+        (GRID, {"lam_x": [[0.1]]}, "setting: setting.lam_x: expected a number or 2 lists of 2 numbers"),
+        (GRID, {"lam": [0.1]}, "setting: setting.lam: a grid takes a number"),
+    ],
+)
+def test_complaints_about_systems(chain, setting, complaint):
+    with pytest.raises(ProfileError) as caught:
+        simulate({**SPEC, "chain": chain, "setting": {"epsilon": 0.01, "omega": 1.1, **setting}})
+    assert complaint in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_rung_that_cannot_answer():
-    spec = {**SPEC, "chain": {**SPEC["chain"], "closure": "ring"}, "rung": "harmonic_balance"}
+    spec = {**SPEC, "chain": {**SPEC["chain"], "closure": "ring"}, "rung": "harmonic_balance", "start": "all"}
     with pytest.raises(RungError, match="ring"):
         simulate(spec)
 

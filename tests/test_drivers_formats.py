@@ -119,3 +119,19 @@ def test_a_csv_edited_by_hand_names_the_line(tmp_path):
         out.write_text("".join([*lines[:number], line, *lines[number + 1 :]]))
         with pytest.raises(UnreadableWaveform, match=says):
             list(read_waveform(out)[1].blocks(100))
+
+
+@pytest.mark.slow
+def test_an_hour_is_streamed_in_the_memory_of_a_minute():
+    """42 channels at 8 kHz, a new page every second out of eight."""
+    rng = np.random.default_rng(1)
+    pages = [TargetPattern((rng.random((6, 6)) < 0.5).astype(complex)) for _ in range(8)]
+    peaks = []
+    for minutes in (1, 60):
+        shown = [Frame(pages[k % 8], 1.0, page=k) for k in range(60 * minutes)]
+        waveform = Waveform.of(plan_scene(Scene(GridShape(6, 6), shown), load_device("paper-6x6")))
+        tracemalloc.start()
+        assert sum(len(block) for block in waveform.blocks(4096)) >= minutes * 60 * 8000
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0] + 1e6

@@ -1,0 +1,71 @@
+"""What was measured of single actuators: the section ``actuators`` of a device profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Actuator", "PlusMinus", "misplaced"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Place = Annotated[int, Field(ge=0, le=1023)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PlusMinus(_Part):
+    """Half widths of 95 % confidence intervals, each in the unit of the number it belongs to."""
+
+    f0_hz: NotNegative | None = None
+    delta: NotNegative | None = None
+    beta: NotNegative | None = None
+    lam: NotNegative | None = None
+    epsilon_per_volt: NotNegative | None = None
+
+
+class Actuator(_Part):
+    """What was measured of one actuator; what is left out is as the profile says.
+
+    Attributes
+    ----------
+    row, col : its place in the grid, from 0.
+    f0_hz : its natural frequency in hertz.
+    delta, beta, lam, epsilon_per_volt : dimensionless in units of the *profile's* f0_hz, as all of the profile is.
+        `lam` is the link from its left neighbour; the first of a chain has `epsilon_per_volt` instead.
+    lam_set : what that link was set to when `lam` was measured.
+    plus_minus : 95 % confidence.
+    """
+
+    row: Place
+    col: Place
+    f0_hz: Positive | None = None
+    delta: Annotated[float, Field(gt=0, lt=1)] | None = None
+    beta: Finite | None = None
+    lam: NotNegative | None = None
+    lam_set: Positive | None = None
+    epsilon_per_volt: Positive | None = None
+    plus_minus: PlusMinus = PlusMinus()
+
+
+def misplaced(actuators: Iterable[Actuator], rows: int, cols: int, chain_length: int) -> str:
+    """What is wrong with where actuators are said to be in a grid, or ""."""
+    seen: set[tuple[int, int]] = set()
+    for index, one in enumerate(actuators):
+        place = f"actuators.{index}: row {one.row}, col {one.col}"
+        if one.row >= rows or one.col >= cols:
+            return f"{place} is outside the grid of {rows} x {cols}"
+        if (one.row, one.col) in seen:
+            return f"{place} is given twice; keep one"
+        first = one.col % chain_length == 0
+        if first and one.lam is not None:
+            return f"{place} is the first of its chain and has no lam; remove it"
+        if not first and one.epsilon_per_volt is not None:
+            return f"{place} is not driven and has no epsilon_per_volt; remove it"
+        seen.add((one.row, one.col))
+    return ""

@@ -1,0 +1,87 @@
+"""One setting of an open chain alone, harmonics 1 and 3: complex numbers in place of arrays of length one.
+
+With ``z = Re(A e^{i theta} + B e^{3 i theta})`` the harmonics of z^3 are ``3/4 |A|^2 A + 3/4 A*^2 B + 3/2 |B|^2 A`` and
+``1/4 A^3 + 3/2 |A|^2 B + 3/4 |B|^2 B``: the same equations as those of the basis of order 3, at a tenth of the time.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scaling import Stages
+
+__all__ = ["march_alone"]
+
+MAX_STEPS = 25
+SMALL_STEP = 1e-10
+
+
+def march_alone(stages: Stages) -> tuple[NDArray[np.float64], int] | None:
+    """Lower branch of the one setting: x (n, 4, 1) and the Newton steps; None where it does not converge."""
+    omega = float(stages.omega[0])
+    deltas, signs = stages.of_each(stages.delta).tolist(), stages.of_each(stages.sign).tolist()
+    first, third = complex(stages.drive[0]), 0j
+    x, steps = np.empty((stages.n, 4, 1)), 0
+    for m, (k, lam) in enumerate(zip(stages.k[:, 0].tolist(), stages.lam[:, 0].tolist(), strict=True)):
+        if m:
+            first, third = lam * first, lam * third
+        near = complex(k - omega * omega, deltas[m] * omega)
+        far = complex(k - 9 * omega * omega, 3 * deltas[m] * omega)
+        try:
+            first, third, done = _oscillator(near, far, signs[m], first, third)
+        except (OverflowError, ZeroDivisionError):
+            return None
+        if not done:
+            return None
+        steps += done
+        x[m, :, 0] = first.real, first.imag, third.real, third.imag
+    return x, steps
+
+
+def _oscillator(
+    near: complex, far: complex, sign: float, first: complex, third: complex
+) -> tuple[complex, complex, int]:
+    """Both harmonics and the Newton steps (0: not converged) of an oscillator with impedances `near` and `far`."""
+    v = _lowest_root(near.real, near.imag, math.copysign(1.0, sign), 0.75 * abs(sign) * abs(first) ** 2)
+    a = first / complex(near.real + math.copysign(v, sign), near.imag)
+    b = (third - 0.25 * sign * a**3) / far
+    for step in range(1, MAX_STEPS):
+        aa, bb, turned = abs(a) ** 2, abs(b) ** 2, a.conjugate()
+        b = (third - 0.25 * sign * a**3) / (far + sign * (1.5 * aa + 0.75 * bb))
+        left = (near + sign * (0.75 * aa + 1.5 * bb)) * a + 0.75 * sign * turned**2 * b - first
+        p, q = near + 1.5 * sign * (aa + bb), sign * (0.75 * a * a + 1.5 * turned * b)
+        move = (p.conjugate() * left - q * left.conjugate()) / (abs(p) ** 2 - abs(q) ** 2)
+        a -= move
+        if abs(move) <= SMALL_STEP * abs(a):
+            return a, b, step
+        if not cmath.isfinite(a):
+            break
+    return a, b, 0
+
+
+def _lowest_root(kappa: float, g: float, sign: float, c: float) -> float:
+    """`Cubic.lowest` of one setting."""
+    bend, gg = -sign * kappa, g * g
+    spread = kappa * kappa - 3 * gg
+    turn = 2 * max(bend, 0.0) / 3
+    if bend > 0 and spread > 0:
+        turn = (kappa * kappa + gg) / (2 * bend + math.sqrt(spread))
+    at_turn = turn * ((kappa + sign * turn) ** 2 + gg)
+    cube, linear = math.cbrt(c), kappa * kappa + gg
+    v = 0.0
+    if not (bend > 0 and c <= at_turn):
+        v = abs(kappa) + cube if bend > 0 else min(cube, c / linear if linear > 0 else math.inf)
+    for _ in range(80):
+        stiff = kappa + sign * v
+        slope = stiff * (stiff + 2 * sign * v) + gg
+        if slope == 0 or not math.isfinite(slope):
+            break
+        step = (v * (stiff * stiff + gg) - c) / slope
+        v -= step
+        if abs(step) <= 1e-9 * abs(v):
+            break
+    return v

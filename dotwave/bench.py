@@ -1,0 +1,79 @@
+"""`dotwave bench`: runs the measurements of a source tree and tells them in a few lines."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import AppError
+
+__all__ = ["BenchReport", "run_bench"]
+
+HARNESS = Path(__file__).resolve().parent.parent / "benchmarks" / "harness.py"
+
+
+@dataclass(frozen=True)
+class BenchReport:
+    """What was measured (the contents of bench.json) and where the files are."""
+
+    found: dict[str, Any]
+    folder: Path
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it."""
+        return self.found
+
+    def as_text(self) -> str:
+        """Our own figures, then a line for each peer."""
+        found = self.found
+        steady, long = found["steady"], found["lengths"]
+        lines = [
+            f"load of the machine before and after: {found['load_before']:.1f}, {found['load_after']:.1f}",
+            f"steady states of {steady['settings']}: {1e3 * steady['wall_s']:.0f} ms wall, "
+            f"{1e3 * steady['cpu_s']:.0f} ms processor, largest error {steady['largest_error']:.1e}",
+            f"one chain alone: {1e3 * found['one_alone']['wall_s']:.2f} ms",
+        ]
+        lines += [
+            f"transients, {each['steps']} steps: {each['chain_periods_per_s'] / 1e6:.1f} M chain-periods/s at "
+            f"{each['median_error']:.1e}, {100 * each['share_of_limit']:.0f} % of the arithmetic limit"
+            for each in found["transients"]
+        ]
+        lines.append(f"chains of {long['n'][0]} to {long['n'][-1]}: cost grows as n^{long['slope']:.2f}")
+        for name, peer in found["peers"].items():
+            lines.append(f"{name}: {_said(peer)}")
+        return "\n".join([*lines, f"written: {self.folder / 'bench.json'}, {self.folder / 'bench.svg'}"])
+
+
+def _said(peer: dict[str, Any]) -> str:
+    if "missing" in peer:
+        return f"missing: {peer['missing']}"
+    told = []
+    if "transient_ratio" in peer:
+        reached = "" if peer["reached"] else " (does not reach our error)"
+        told.append(f"{peer['transient_ratio']:.3g} times slower in transients{reached}")
+    extrapolated = " (extrapolated)" if peer["extrapolated"] else ""
+    return ", ".join([*told, f"{peer['steady_ratio']:.3g} times to a steady state{extrapolated}"])
+
+
+def run_bench(folder: Path, *, quick: bool) -> BenchReport:
+    """Measure in a fresh interpreter, and write bench.json and bench.svg into `folder`.
+
+    Raises
+    ------
+    AppError
+        Outside a source tree, or when the measurement fails.
+    """
+    if not HARNESS.exists():
+        raise AppError(
+            "the measurements are in the source tree, in benchmarks/; run this from a clone: ./run dotwave bench"
+        )
+    call = [sys.executable, str(HARNESS), str(folder), *(["--quick"] if quick else [])]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise AppError(f"benchmarks/harness.py: {last}")
+    return BenchReport(json.loads((folder / "bench.json").read_text(encoding="utf-8")), folder)

@@ -1,0 +1,1 @@
+"""The paper's figures, made again: Naik and Nair, Coupled Piezoelectric Actuators for the Tactile Display."""
