@@ -11,6 +11,7 @@ from .device import Amplifier, Coupling, Device, Note, Span, device_names, load_
 from .errors import ChainError, ProfileError
 from .response import Branch, Outcome, Response, Stats
 from .rung import RUNGS, Rung, RungError, Start, load_rung
+from .yamlfile import parse_model, read_model
 
 if TYPE_CHECKING:
     from .continuation import continue_branch
@@ -77,9 +78,11 @@ __all__ = [
     "integrate_terms",
     "load_device",
     "load_rung",
+    "parse_model",
     "parse_simulation",
     "peak_gain",
     "reached_from_rest",
+    "read_model",
     "read_simulation",
     "read_sweep",
     "rest_eigenvalues",

@@ -15,7 +15,9 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from .cli_pictures import picture_app
 from .cli_play import play_app
+from .cli_study import study_app
 from .command import Device, Json, Written, printable
 from .command import finish as _finish
 from .errors import Terminated, bad_input
@@ -40,7 +42,9 @@ GAP = "in actuators."
 def text(
     source: Annotated[str, typer.Argument(metavar="TEXT|FILE|-", help="A file if it exists, - for stdin, else words.")],
     device: Device = "paper-6x6",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
+    ] = None,
     table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
     undefined: Annotated[
         Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
@@ -57,6 +61,9 @@ def text(
     contrast: Annotated[
         float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
     ] = 20.0,
+    actuator: Annotated[
+        str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
+    ] = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     as_json: Json = False,
 ) -> None:
@@ -70,7 +77,7 @@ def text(
     Example:
       dotwave text "Hello world" --device linked-6x6 -o hello.wav
     """
-    from .options import text_options
+    from .options import place_of, text_options
     from .pipeline import render_text
 
     options = text_options(
@@ -79,7 +86,7 @@ def text(
     )  # fmt: skip
     report = render_text(
         source, device=device, out=output, options=options, encoding=sample_format.value,
-        contrast_db=contrast,
+        contrast_db=contrast, actuator=place_of(actuator),
     )  # fmt: skip
     _finish(report, as_json, ok=report.ok)
 
@@ -197,6 +204,8 @@ def doctor(as_json: Json = False) -> None:
     _finish(report, as_json, ok=report.ok)
 
 
+app.add_typer(picture_app)
+app.add_typer(study_app)
 app.add_typer(play_app)
 
 

@@ -46,6 +46,7 @@ class TargetPattern:
     kind : on/off, sine or bars.
     weight : float64, shape (rows, cols), 0 = don't care; None means 1 everywhere.
     phase_matters : whether the arguments of `amplitude` are part of the wish.
+    any_phase : bool, shape (rows, cols), where they are not although `phase_matters`; None means nowhere.
     walking : the amplitude is the largest that passes by, in bars that walk; None for what stands.
     """
 
@@ -54,6 +55,7 @@ class TargetPattern:
     weight: NDArray[np.float64] | None = None
     phase_matters: bool = False
     walking: WalkingBars | None = None
+    any_phase: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, slots=True)

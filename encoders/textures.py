@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,7 +107,8 @@ class Region:
 def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
     """Textures side by side; what no region covers is flat.
 
-    Each region shows its part of a texture made for the whole grid. The phase of waves is part of the wish.
+    Each region shows its part of a texture made for the whole grid. The phase is part of the wish where it is in
+    that of the region.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
         When a region leaves the grid, overlaps another, holds walking bars, or was made for another grid.
     """
     amplitude = np.zeros((shape.rows, shape.cols), dtype=np.complex128)
-    taken = np.zeros(amplitude.shape, dtype=np.bool_)
+    taken, any_phase = np.zeros(amplitude.shape, dtype=np.bool_), np.ones(amplitude.shape, dtype=np.bool_)
     for number, part in enumerate(parts):
         inside = 0 <= part.top < part.bottom <= shape.rows and 0 <= part.left < part.right <= shape.cols
         if not inside or part.texture.amplitude.shape != amplitude.shape:
@@ -127,8 +128,11 @@ def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
             raise TextureError(f"region {number}: overlaps one before it")
         taken[window] = True
         amplitude[window] = part.texture.amplitude[window]
+        any_phase[window] = not part.texture.phase_matters
+    any_phase.flags.writeable = False
     waves = [part.texture.kind for part in parts if part.texture.phase_matters]
-    return _target(amplitude, waves[0] if waves else PatternKind.ON_OFF, phase_matters=bool(waves))
+    target = _target(amplitude, waves[0] if waves else PatternKind.ON_OFF, phase_matters=bool(waves))
+    return replace(target, any_phase=any_phase) if waves and any_phase.any() else target
 
 
 def _level(level: float) -> float:

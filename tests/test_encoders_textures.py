@@ -42,6 +42,9 @@ def test_regions_show_their_part_of_a_texture():
     np.testing.assert_array_equal(both.amplitude[4:, 2:6], dots.amplitude[4:, 2:6])
     assert not both.amplitude[3].any()
     assert both.phase_matters
+    assert both.any_phase is not None
+    assert not both.any_phase[:3].any()
+    assert both.any_phase[3:].all()
     assert not regions(GRID, [Region(0, 1, 0, 1, dots)]).phase_matters
 
 

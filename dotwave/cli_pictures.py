@@ -1,0 +1,124 @@
+"""The commands for pictures, sets of icons and job files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .command import Device, Json, finish
+from .options import SampleFormat
+
+__all__ = ["picture_app"]
+
+picture_app = typer.Typer(rich_markup_mode=None)
+
+Contrast = Annotated[
+    float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
+]
+
+
+@picture_app.command(short_help="Render pictures as patterns that can be felt.")
+def image(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.")],
+    device: Device = "paper-6x6",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
+    explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
+    style: Annotated[str | None, typer.Option(help="Defaults for: auto, icon, photo.")] = None,
+    fit: Annotated[str | None, typer.Option(help="contain, cover or stretch.")] = None,
+    kind: Annotated[str | None, typer.Option("--as", help="What a dot can be: on_off, levels, texture.")] = None,
+    threshold: Annotated[str | None, typer.Option(help="otsu, adaptive or fixed.")] = None,
+    invert: Annotated[str | None, typer.Option(help="Raise what is dark: auto, yes, no.")] = None,
+    edges: Annotated[bool, typer.Option("--edges", help="Outlines in place of areas.")] = False,
+    zoom: Annotated[int, typer.Option(help="2 to 16: an overview, then parts of the picture.")] = 1,
+    dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
+    contrast: Contrast = 20.0,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    as_json: Json = False,
+) -> None:
+    """Render pictures, one after another, and write the waveforms that make them felt.
+
+    \b
+    Example:
+      dotwave image samples/icons/heart.svg -o heart.wav --explain steps
+    """
+    from .image import picture_options, render_images
+    from .render import Rendering
+
+    options = picture_options(
+        style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
+    )
+    how = Rendering(output, sample_format.value, contrast)
+    report = render_images(files, device=device, options=options, how=how, explain=explain)
+    finish(report, as_json, ok=report.ok)
+
+
+@picture_app.command(short_help="Render a set of icons and tell them apart.")
+def icons(
+    sources: Annotated[
+        list[str], typer.Argument(metavar="DIR|GLOB|ARCHIVE...", help="Folders, globs, zip or tar archives.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
+    device: Device = "paper-6x6",
+    distinct: Annotated[bool, typer.Option("--distinct", help="Choose patterns that are not alike.")] = False,
+    waveforms: Annotated[bool, typer.Option("--waveforms", help="Write a .wav for every icon.")] = False,
+    closer_than: Annotated[int, typer.Option(min=0, help="List pairs that differ in fewer dots.")] = 2,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes side by side; default: all cores.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Work on a dask cluster: tcp://HOST:PORT.")] = None,
+    dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
+    contrast: Contrast = 20.0,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    as_json: Json = False,
+) -> None:
+    """Encode and plan every icon; write manifest.json, manifest.csv, contact.png and index.html.
+
+    Stopped in any way, the same call goes on where it was. The exit code is 1 when a file could not be used or a
+    pattern cannot be made; the others are done all the same.
+
+    \b
+    Example:
+      dotwave icons samples/icons -o out/icons --distinct
+    """
+    from .icons import IconOptions, render_icons
+
+    options = IconOptions(
+        device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
+        closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
+    )  # fmt: skip
+    report = render_icons(sources, output, options)
+    finish(report, as_json, ok=report.ok)
+
+
+@picture_app.command(short_help="Carry out a job file.")
+def render(
+    job: Annotated[Path, typer.Argument(metavar="JOB.yaml", help="Device, tolerance, output and a sequence.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Render a sequence of texts, pictures, icons, textures and pauses.
+
+    Nothing is written when a frame cannot be made as asked; the exit code is then 1.
+
+    \b
+    Example:
+      dotwave render samples/jobs/mixed.yaml
+    """
+    from .render import render_job
+
+    report = render_job(job, output)
+    finish(report, as_json, ok=report.ok)
+
+
+@picture_app.command(short_help="Print the JSON Schema of job files.")
+def schema() -> None:
+    """Print the JSON Schema of job files, for editors that complete and check them.
+
+    \b
+    Example:
+      dotwave schema > job.schema.json
+    """
+    from .job import job_schema
+
+    typer.echo(json.dumps(job_schema(), indent=2))

@@ -1,0 +1,222 @@
+"""The work of a set of icons, piece by piece; what the journal has is not done again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from drivers import Encoding, atomic_paths, naming
+from planner import DEFAULT_CONTRAST_DB
+
+from .icon_journal import Journal
+from .icon_pool import Pool, Work
+from .icon_progress import icon_progress
+from .icon_report import IconsReport
+from .icon_set import Icon, Pattern, best_pattern, chosen_patterns, figure_of
+from .icon_sources import IconPlace, read_icons
+from .icon_work import Recipe, Task, encode_icons, plan_patterns, write_waves
+
+__all__ = ["CANDIDATES", "IconOptions", "IconRun"]
+
+Record = Mapping[str, Any]
+
+CANDIDATES, MORE_CANDIDATES = 64, 256
+BATCH, WAVE_BATCH = 16, 2
+
+
+@dataclass(frozen=True)
+class IconOptions:
+    """How a set is rendered.
+
+    Attributes
+    ----------
+    device : profile name or file. distinct : choose patterns that are not alike. waveforms : write a .wav for each.
+    workers : processes, None for one a core. scheduler : address of a dask scheduler to work there instead.
+    closer_than : pairs of icons nearer than this are listed. dwell_s : length of a waveform's frame.
+    """
+
+    device: str = "paper-6x6"
+    distinct: bool = False
+    waveforms: bool = False
+    workers: int | None = None
+    scheduler: str | None = None
+    closer_than: int = 2
+    contrast_db: float = DEFAULT_CONTRAST_DB
+    dwell_s: float = 1.0
+    encoding: Encoding = "float32"
+
+
+@dataclass
+class IconRun:
+    """What is known so far of every icon; the records themselves are in the journal."""
+
+    recipe: Recipe
+    options: IconOptions
+    out: Path
+    places: Sequence[IconPlace]
+    journal: Journal
+    keys: dict[str, str] = field(default_factory=dict)
+    digests: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
+    chosen: dict[str, Pattern] = field(default_factory=dict)
+    waves: dict[str, str] = field(default_factory=dict)
+    worked: int = 0
+
+    def work(self, pool: Pool) -> None:
+        """Do what is not in the journal yet."""
+        self._encode(pool, self.recipe, self.places, self.keys)
+        if self.options.distinct:
+            self.chosen = chosen_patterns(
+                self._records(self.keys), self.recipe.shape, lambda names: self._more(pool, names)
+            )
+            self._plan(pool)
+        if self.options.waveforms:
+            self._write(pool)
+
+    def _records(self, keys: Mapping[str, str]) -> dict[str, Record]:
+        """Records of the icons that were encoded."""
+        found = {name: self.journal.find(key) for name, key in keys.items()}
+        return {name: record for name, record in found.items() if record is not None and "bad" not in record}
+
+    def _encode(self, pool: Pool, recipe: Recipe, places: Sequence[IconPlace], keys: dict[str, str]) -> None:
+        def tasks() -> Iterator[Task]:
+            for file in read_icons(places):
+                if file.error:
+                    self.failed[file.name] = file.error
+                    continue
+                self.digests[file.name] = "sha256:" + hashlib.sha256(file.data).hexdigest()
+                keys[file.name] = recipe.key("icon", file.data)
+                yield Task(keys[file.name], file.data)
+
+        for records in self._do(pool, encode_icons, recipe, tasks(), "encoding", len(places), BATCH):
+            self.journal.add(*records)
+        for name, key in keys.items():
+            record = self.journal.find(key) or {"bad": self.lost.get(key, "")}
+            if "bad" in record:
+                self.failed[name] = record["bad"]
+
+    def _more(self, pool: Pool, names: Sequence[str]) -> dict[str, Record]:
+        wanted, keys = set(names), dict[str, str]()
+        recipe = replace(self.recipe, options=replace(self.recipe.options, candidates=MORE_CANDIDATES))
+        self._encode(pool, recipe, [place for place in self.places if place.name in wanted], keys)
+        return self._records(keys)
+
+    def _plan(self, pool: Pool) -> None:
+        tasks = [self._pattern_task("plan", name) for name in sorted(self.chosen) if not self._is_best(name)]
+        for records in self._do(pool, plan_patterns, self.recipe, tasks, "planning", len(tasks), BATCH):
+            self.journal.add(*records)
+
+    def _write(self, pool: Pool) -> None:
+        """One waveform at a time is put in place, then noted: a name is noted with what was made of it last."""
+        tasks, names = [], {}
+        for icon in self.icons():
+            task = self._pattern_task("wave", icon.name)
+            path = self.out / "waveforms" / f"{icon.name}.wav"
+            names[task.key] = icon.name
+            if icon.outcome != "ok":
+                continue
+            noted = self.journal.find(f"wave:{icon.name}")
+            if noted and noted["made"] == task.key and path.is_file():
+                self.waves[icon.name] = noted["file"]
+            else:
+                tasks.append(task)
+        for records in self._do(pool, write_waves, self.recipe, tasks, "writing", len(tasks), WAVE_BATCH):
+            for record in records:
+                self._put_wave(names[record["key"]], record)
+
+    def _put_wave(self, name: str, record: Record) -> None:
+        if "bad" in record:
+            self.failed[name] = record["bad"]
+            return
+        path = self.out / "waveforms" / f"{name}.wav"
+        with naming(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_paths(path, path.with_suffix(".json")) as (wav, manifest):
+            wav.write_bytes(record["wav"])
+            manifest.write_bytes(record["json"])
+        self.waves[name] = path.relative_to(self.out).as_posix()
+        self.journal.add({"key": f"wave:{name}", "made": record["key"], "file": self.waves[name]})
+
+    def _do(
+        self, pool: Pool, work: Work, recipe: Recipe, tasks: Iterable[Task], label: str, total: int, batch: int
+    ) -> Iterator[list[dict[str, Any]]]:
+        """Records of the tasks that are not in the journal yet; of lost ones only the problem is kept."""
+        with icon_progress(label, total) as step:
+            seen: set[str] = set()
+
+            def missing() -> Iterator[Task]:
+                for task in tasks:
+                    if task.key in seen or task.key in self.journal:
+                        step(False)
+                    else:
+                        seen.add(task.key)
+                        yield task
+
+            for records in pool.run(work, recipe, missing(), batch):
+                self.worked += len(records)
+                for record in records:
+                    step(True)
+                    if "lost" in record:
+                        self.lost[record["key"]] = record["bad"]
+                yield [record for record in records if "lost" not in record]
+
+    def _pattern_task(self, kind: str, name: str) -> Task:
+        amplitude = self._pattern(name).amplitude
+        rows = tuple(tuple(row) for row in amplitude.tolist())
+        item = f"{name if kind == 'wave' else ''} {rows}".encode()
+        return Task(self.recipe.key(kind, item), amplitude=rows, name=PurePosixPath(name).name)
+
+    def _pattern(self, name: str) -> Pattern:
+        return self.chosen[name] if name in self.chosen else self._best(name)
+
+    def _best(self, name: str) -> Pattern:
+        record = self.journal.find(self.keys[name])
+        assert record is not None
+        return best_pattern(record, self.recipe.shape)
+
+    def _is_best(self, name: str) -> bool:
+        return np.array_equal(self._pattern(name).amplitude, self._best(name).amplitude)
+
+    def icons(self) -> Iterator[Icon]:
+        """Every icon that was encoded, sorted by name."""
+        for name in sorted(self.keys):
+            record = self.journal.find(self.keys[name])
+            if record is not None and "bad" not in record:
+                yield self._icon(name, record)
+
+    def _icon(self, name: str, record: Record) -> Icon:
+        best = best_pattern(record, self.recipe.shape)
+        pattern = self.chosen.get(name, best)
+        same = np.array_equal(pattern.amplitude, best.amplitude)
+        plan = record["plan"] if same else self.journal.find(self._pattern_task("plan", name).key) or {}
+        notes = list(record["notes"])
+        if record["frames"] > 1:
+            notes.append(f"the first of its {record['frames']} frames")
+        return Icon(
+            name=name, digest=self.digests[name], kind=record["kind"], pattern=pattern,
+            lost=round(best.similarity - pattern.similarity, 6), figure=figure_of(record, self.recipe.shape),
+            outcome=plan.get("outcome", "not_planned"), error=plan.get("error"), note=plan.get("note", ""),
+            notes=tuple(notes), waveform=self.waves.get(name, ""),
+        )  # fmt: skip
+
+    def report(self, *, complete: bool, seconds: float) -> IconsReport:
+        """What there is to say now."""
+        icons = list(self.icons())
+        known = {icon.name for icon in icons} | set(self.failed)
+        return IconsReport.of(
+            icons,
+            device=self.recipe.device.name,
+            distinct=self.options.distinct,
+            closer_than=self.options.closer_than,
+            failed=self.failed,
+            unfinished=tuple(place.name for place in self.places if place.name not in known),
+            complete=complete,
+            worked=self.worked,
+            seconds=seconds,
+        )

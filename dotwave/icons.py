@@ -1,0 +1,58 @@
+"""A set of icons: encoded, planned, told apart, written; what was finished is never done again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from chainsim import load_device
+from drivers import naming
+from encoders import PictureOptions
+
+from .icon_journal import Journal
+from .icon_pool import ClusterPool, LocalPool, Pool
+from .icon_report import IconsReport, write_report
+from .icon_run import CANDIDATES, IconOptions, IconRun
+from .icon_sources import find_icons
+from .icon_work import Recipe, code_digest
+
+__all__ = ["IconOptions", "render_icons"]
+
+
+def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None = None) -> IconsReport:
+    """Encode and plan every icon of `sources` and write manifest, contact sheets and waveforms into folder `out`.
+
+    A picture that cannot be used is reported and the others go on. A run into the same folder takes over what an
+    earlier one finished, however that one ended. On Ctrl-C the manifest of what is finished is written.
+
+    Raises
+    ------
+    AppError
+        When there are no pictures, or no scheduler answers.
+    ChainError, DriverError
+        When the device cannot be used, or the disk refuses.
+    """
+    began = time.perf_counter()
+    options = options or IconOptions()
+    device = load_device(options.device)
+    picture = PictureOptions(
+        pitch_m=(device.pitch_m, device.pitch_m),
+        dwell_s=options.dwell_s,
+        candidates=CANDIDATES if options.distinct else 1,
+    )
+    recipe = Recipe(device, picture, options.contrast_db, options.encoding, code_digest())
+    places = find_icons(sources)
+    with naming(out):
+        out.mkdir(parents=True, exist_ok=True)
+    pool: Pool = ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers)
+    with Journal(out / "journal.jsonl") as journal:
+        run = IconRun(recipe, options, out, places, journal)
+        try:
+            with pool:
+                run.work(pool)
+        except (KeyboardInterrupt, SystemExit):
+            write_report(run.report(complete=False, seconds=time.perf_counter() - began), out, pictures=False)
+            raise
+        report = run.report(complete=True, seconds=time.perf_counter() - began)
+    return write_report(report, out, pictures=True)

@@ -1,0 +1,255 @@
+"""Scenes and job files to waveforms: plan every frame, write what can be made, say what cannot."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chainsim import Device, Outcome
+from drivers import Encoding, WrittenWaveform, naming, write_waveform
+from encoders import (
+    EncodeError,
+    Frame,
+    GridShape,
+    Scene,
+    Style,
+    TargetPattern,
+    TextOptions,
+    TextSource,
+    encode_picture,
+    encode_text,
+)
+from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
+
+from .errors import AppError
+from .job import TOLERANCES, Item, Job, PicturePart, TextPart, read_job
+from .progress import progress
+from .scene_report import SceneReport
+
+__all__ = ["Rendering", "Shown", "joined", "picture_words", "render_job", "render_scene"]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One part of a sequence: its scene, and a line that says what it is."""
+
+    scene: Scene
+    words: str
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """How a scene is carried out.
+
+    Attributes
+    ----------
+    out : the .wav, None to plan only. tolerance : largest predicted error of a frame that is ok, full scale.
+    planning_s : most seconds for planning, None for any.
+    """
+
+    out: Path | None = None
+    encoding: Encoding = "float32"
+    contrast_db: float = DEFAULT_CONTRAST_DB
+    tolerance: float = TOLERANCES["normal"]
+    planning_s: float | None = None
+
+
+def render_job(path: Path, out: Path | None = None) -> SceneReport:
+    """Carry out the job file `path`; `out` is written in place of the job's own output.
+
+    Raises
+    ------
+    AppError, ChainError, DriverError, EncodeError, PlanError
+        When the job, or what it names, cannot be used.
+    """
+    began = time.perf_counter()
+    job, folder = read_job(path), path.parent
+    try:
+        device = job.device.device(folder)
+    except ValueError as error:
+        raise AppError(f"{path}: device: {error}") from None
+    shape = GridShape(device.rows, device.cols)
+    parts = []
+    for number, item in enumerate(job.sequence):
+        try:
+            parts.append(_shown(item, job, device, shape, folder))
+        except EncodeError as error:
+            raise AppError(f"{path}: sequence.{number}: {error}") from None
+    if out is None and job.output is not None:
+        out = Path(os.path.normpath(folder / job.output))
+        with naming(out.parent):
+            out.parent.mkdir(parents=True, exist_ok=True)
+    how = Rendering(
+        out, job.sample_format, job.contrast_db, TOLERANCES[job.tolerance],
+        job.budget.planning_s if job.budget else None,
+    )  # fmt: skip
+    report = render_scene(joined(parts, shape), device, how, [part.words for part in parts])
+    return replace(report, seconds=time.perf_counter() - began)
+
+
+def _shown(item: Item, job: Job, device: Device, shape: GridShape, folder: Path) -> Shown:
+    if item.text is not None:
+        return _text(item.text, job, shape, folder)
+    if item.image is not None:
+        return _picture(item.image, device, shape, folder)
+    if item.icon is not None:
+        chosen = item.icon if item.icon.style is not Style.AUTO else item.icon.model_copy(update={"style": Style.ICON})
+        return _picture(chosen, device, shape, folder)
+    if item.texture is not None:
+        kind = next(name for name, value in item.texture if value is not None)
+        return _still(item.texture.target(shape), item.texture.dwell_s, f"texture: {kind}")
+    assert item.pause_s is not None
+    blank = np.zeros((shape.rows, shape.cols), np.complex128)
+    blank.flags.writeable = False
+    return _still(TargetPattern(blank), item.pause_s, f"pause of {item.pause_s:g} s")
+
+
+def _text(part: TextPart, job: Job, shape: GridShape, folder: Path) -> Shown:
+    given = part.model_dump(exclude={"say", "file"})
+    given["presentation"] = part.presentation or job.presentation
+    source = TextSource.of_path(folder / part.file) if part.file is not None else TextSource.of_text(part.say or "")
+    words = source.text if len(source.text) <= 40 else source.text[:37] + "..."
+    return Shown(encode_text(source, shape, TextOptions(**given)), f"text: {words}")
+
+
+def _picture(part: PicturePart, device: Device, shape: GridShape, folder: Path) -> Shown:
+    scene = encode_picture(folder / part.file, shape, part.options(device.pitch_m))
+    return Shown(scene, picture_words(scene.report))
+
+
+def picture_words(report: Any) -> str:
+    """One line on an encoded picture (`encoders.PictureReport`): file, style, similarity, what was left out."""
+    frames = f", {len(report.frames)} frames" if len(report.frames) > 1 else ""
+    notes = f" ({'; '.join(report.notes)})" if report.notes else ""
+    return f"{report.style}: {Path(report.name).name}{frames}, similarity {report.similarity:.2f}{notes}"
+
+
+def _still(pattern: TargetPattern, dwell_s: float, words: str) -> Shown:
+    shape = GridShape(*pattern.amplitude.shape)
+    return Shown(Scene(shape, (Frame(pattern, dwell_s),), {"kind": "texture"}), words)
+
+
+def joined(parts: Sequence[Shown], shape: GridShape) -> Scene:
+    """One scene after another; a single one stays what it is, so that a text can be read back."""
+    if len(parts) == 1:
+        return parts[0].scene
+    encoding: Mapping[str, Any] = {"kind": "sequence", "parts": [dict(part.scene.encoding) for part in parts]}
+    return Scene(shape, _Frames(tuple(part.scene for part in parts)), encoding)
+
+
+@dataclass(frozen=True)
+class _Frames:
+    """The frames of scenes one after another, pages counted on; encoded again on every reading."""
+
+    scenes: tuple[Scene, ...]
+
+    def __iter__(self) -> Iterator[Frame]:
+        first = 0
+        for scene in self.scenes:
+            page = -1
+            for frame in scene.frames:
+                page = max(page, frame.page)
+                yield replace(frame, page=first + frame.page)
+            first += page + 1
+
+
+def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[str]) -> SceneReport:
+    """Plan a scene and, with an output, write it; nothing is written when a frame cannot be made as asked.
+
+    Parameters
+    ----------
+    parts : lines on what is shown, for the report.
+
+    Raises
+    ------
+    PlanError, DriverError
+        When the scene does not fit the device, or the disk refuses.
+    """
+    began = time.perf_counter()
+    watch = _Watch(plan_scene(scene, device, contrast_db=how.contrast_db), how)
+    written: WrittenWaveform | None = None
+    with progress("rendering") as update:
+        try:
+            if how.out is None:
+                for frame in watch:
+                    update(frame.end_s)
+            else:
+                plan = replace(watch.plan, frames=watch)
+                written = write_waveform(plan, how.out, encoding=how.encoding, progress=update)
+        except _Stop:
+            pass
+    peak = float(np.max(np.abs(written.peak_volts))) if written else watch.volts * device.amplifier.volts
+    return SceneReport(
+        device=device.name,
+        parts=tuple(parts),
+        frames=sum(watch.outcomes.values()),
+        duration_s=watch.duration_s,
+        files=(str(written.samples_path), str(written.manifest_path)) if written else (),
+        peak_volts=peak,
+        limit_volts=device.amplifier.volts,
+        ramp_s=watch.ramp_s,
+        error=watch.error,
+        tolerance=how.tolerance,
+        outcomes=watch.outcomes,
+        notes=tuple(watch.notes),
+        seconds=time.perf_counter() - began,
+    )
+
+
+class _Stop(Exception):
+    """There is nothing to write, or no time left."""
+
+
+@dataclass
+class _Watch:
+    """The plan's frames passed through, and what is to be said of them."""
+
+    plan: Plan
+    how: Rendering
+    outcomes: dict[str, int] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    duration_s: float = 0.0
+    ramp_s: float = 0.0
+    error: float = 0.0
+    volts: float = 0.0
+
+    def __iter__(self) -> Iterator[FramePlan]:
+        began = time.monotonic()
+        for number, frame in enumerate(self.plan.frames, 1):
+            error = max(state.error for state in frame.states)
+            outcome, note = frame.outcome, frame.note
+            if self.how.planning_s is not None and time.monotonic() - began > self.how.planning_s:
+                outcome = Outcome.OUT_OF_BUDGET
+                note = f"planning took longer than {self.how.planning_s:g} s; give budget.planning_s more."
+            elif outcome is Outcome.OK and error > self.how.tolerance:
+                outcome = Outcome.UNREACHABLE
+                note = f"off by {100 * error:.3g} % of full scale, {100 * self.how.tolerance:g} % are allowed."
+            if frame.frame is not None or outcome is not Outcome.OK:
+                self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
+            self.duration_s, self.error = frame.end_s, max(self.error, error)
+            self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
+            self.volts = max(self.volts, *(state.margins.volts for state in frame.states))
+            if outcome is not Outcome.OK:
+                self._failed(number, frame, note, outcome)
+            yield frame
+
+    def _failed(self, number: int, frame: FramePlan, note: str, outcome: Outcome) -> None:
+        if not self.notes:
+            self.notes += [f"Frame {number}: {note}", *_nearest(frame, self.plan.device)]
+            if self.how.out is not None:
+                self.notes.append("Nothing was written.")
+        if self.how.out is not None or outcome is Outcome.OUT_OF_BUDGET:
+            raise _Stop
+
+
+def _nearest(frame: FramePlan, device: Device) -> Iterator[str]:
+    yield "The nearest pattern it can make, in percent of full scale, row by row:"
+    levels = np.array([np.abs(state.phasor + state.mean) for state in frame.states]) / device.full_scale
+    for row in levels.reshape(device.rows, device.cols):
+        yield "  " + " ".join(f"{100 * level:3.0f}" for level in row)
