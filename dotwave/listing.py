@@ -17,6 +17,7 @@ __all__ = ["DeviceListing", "TableListing", "list_devices", "list_translation_ta
 
 _SCOPES = {
     "none": "actuators not coupled",
+    "fixed": "one built-in lam",
     "device": "one lam for the whole device",
     "chain": "one lam per chain",
     "link": "a lam on every link",
@@ -102,7 +103,8 @@ def _summary(device: Device) -> Iterator[str]:
     yield f"  chains: {chains} {kind} of {device.chain_length}; {scope}{span}"
     yield f"  bias: {'one per actuator' if device.bias == 'actuator' else 'none'}"
     drive = f"{device.omega.min * device.f0_hz:.0f} to {device.omega.max * device.f0_hz:.0f} Hz"
-    yield f"  drive: one per chain, {drive}, up to {device.amplifier.volts:g} V at {device.amplifier.rate_hz} samples/s"
+    shared = "common to all chains" if device.drive == "device" else "one per chain"
+    yield f"  drive: {shared}, {drive}, up to {device.amplifier.volts:g} V at {device.amplifier.rate_hz} samples/s"
     assumed = sorted(name for name, note in device.notes.items() if note.assumed)
     yield f"  assumed: {', '.join(assumed) or 'nothing'}"
 

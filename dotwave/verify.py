@@ -17,11 +17,12 @@ from drivers import FrameMark, Manifest, Role, read_waveform
 from encoders import back_check, covered_text, read_cells
 
 from .progress import progress
-from .report import DOT_THRESHOLD, FrameCheck, VerifyReport
+from .report import AMPLITUDE_ERROR_LIMIT, DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
 
 __all__ = ["verify"]
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 # Forces, links and positions of a block stay near 8 MB each, whatever the grid.
 BLOCK_VALUES = 1 << 20
@@ -31,12 +32,15 @@ class Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
     `level` is what is compared with the target: the mean of a bias pattern, else the amplitude at the
-    drive's frequency. `still` and `moving` are both of them.
+    drive's frequency, or the sum of those at all its tones. `still` and `moving` are both of them. `error` is the
+    deviation from the target: of the complex amplitude where phases are wanted, of the worst tone where there are
+    several.
     """
 
     level: Floats
     still: Floats
     moving: Floats
+    error: Floats
 
 
 def verify(path: Path) -> VerifyReport:
@@ -123,38 +127,69 @@ class _Integration:
 
 
 class _Fit:
-    """Least squares of 1, cos and sin at each row's drive frequency over the samples of one frame."""
+    """Least squares of 1 and of cos and sin at each row's frequencies over the samples of one frame."""
 
     def __init__(self, device: Device, mark: FrameMark, rate_hz: int) -> None:
         self._device, self._mark, self._rate_hz = device, mark, rate_hz
         self.first = round(mark.settled_s * rate_hz)
         self.stop = round(mark.end_s * rate_hz)
-        self._gram = np.zeros((device.rows, 3, 3))
-        self._load = np.zeros((device.rows, 3, device.cols))
+        self._rates = [_frequencies(omega, tones) for omega, tones in zip(mark.omega, mark.tones, strict=True)]
+        sizes = [1 + 2 * len(rates) for rates in self._rates]
+        self._gram = [np.zeros((size, size)) for size in sizes]
+        self._load = [np.zeros((size, device.cols)) for size in sizes]
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
         inside = slice(*np.searchsorted(index, [self.first, self.stop]))
         tau = index[inside] / self._rate_hz * self._device.tau_per_s
-        for row, omega in enumerate(self._mark.omega):
-            if row == 0 or omega != self._mark.omega[row - 1]:
-                basis = np.stack([np.ones_like(tau), np.cos(omega * tau), np.sin(omega * tau)])
+        for row, rates in enumerate(self._rates):
+            if row == 0 or rates != self._rates[row - 1]:
+                waves = (wave(rate * tau) for rate in rates for wave in (np.cos, np.sin))
+                basis = np.stack([np.ones_like(tau), *waves])
             self._gram[row] += basis @ basis.T
             self._load[row] += basis @ z[inside, row]
 
     def felt(self) -> Felt:
-        """Mean and amplitude; NaN where the frame has too few samples to tell."""
-        full, shape = self._device.full_scale, (self._device.rows, self._device.cols)
-        if self._gram[0, 0, 0] < 3:
+        """What is felt; NaN where the frame has too few samples to tell."""
+        full, shape, mark = self._device.full_scale, (self._device.rows, self._device.cols), self._mark
+        if self._gram[0][0, 0] < max(map(len, self._gram)):
             nothing = np.full(shape, np.nan)
-            return Felt(nothing, nothing, nothing)
-        parts = np.stack([np.linalg.lstsq(g, v)[0] for g, v in zip(self._gram, self._load, strict=True)], axis=1)
-        still, moving = parts[0] / full, np.hypot(parts[1], parts[2]) / full
-        return Felt(still if self._device.bias == "actuator" else moving, still, moving)
+            return Felt(nothing, nothing, nothing, nothing)
+        still, phasor, moving = np.empty(shape), np.empty(shape, dtype=np.complex128), np.empty(shape)
+        worst = np.empty(shape)
+        for row, (gram, load) in enumerate(zip(self._gram, self._load, strict=True)):
+            parts = np.linalg.lstsq(gram, load)[0] / full
+            count = 1 + len(mark.tones[row])
+            tones = parts[1 : 1 + 2 * count : 2] - 1j * parts[2 : 2 + 2 * count : 2]
+            still[row], phasor[row], moving[row] = parts[0], tones[0], np.abs(tones).sum(axis=0)
+            worst[row] = np.abs(count * np.abs(tones) - mark.target[row]).max(axis=0)
+        standing = ~np.array(mark.moving)
+        worst[standing] = np.abs(still - mark.target)[standing]
+        level = np.where(standing[:, np.newaxis], still, moving)
+        return Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
+
+    def _out_of_phase(self, phasor: Complexes) -> Floats:
+        """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""
+        mark = self._mark
+        wanted = mark.target * np.exp(1j * np.nan_to_num(mark.phase)) * ~np.isnan(mark.phase)
+        away = np.zeros(phasor.shape)
+        for omega in set(mark.omega.tolist()):
+            rows = mark.omega == omega
+            turn = np.exp(1j * np.angle(np.vdot(phasor[rows], wanted[rows])))
+            away[rows] = np.abs(phasor[rows] * turn - wanted[rows])
+        return np.where(np.isnan(mark.phase), 0.0, away)
+
+
+def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
+    """The tones of a row, then the combinations that a cubic spring makes of them beside each."""
+    own = [float(omega), *tones]
+    return own + sorted({2 * one - other for one in own for other in own} - set(own))
 
 
 def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
     wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
+    # A level wanted at the threshold itself may be felt on either side of it.
+    near = np.abs(felt.level - mark.target) <= AMPLITUDE_ERROR_LIMIT
     return FrameCheck(
         page=mark.page,
         start_s=mark.start_s,
@@ -163,21 +198,12 @@ def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
         outcome=str(mark.outcome),
         target=mark.target,
         felt=felt.level,
-        wrong_dots=int(np.count_nonzero((wanted != present) | np.isnan(felt.level))),
-        contrast_db=_contrast_db(wanted, felt.level),
-        amplitude_error=float(np.max(np.abs(felt.level - mark.target))),
+        wrong_dots=int(np.count_nonzero(((wanted != present) & ~near) | np.isnan(felt.level))),
+        contrast_db=contrast_between(wanted, felt.level),
+        amplitude_error=float(np.max(felt.error)),
         wanted_cells=mark.cells,
         text=mark.text,
     )
-
-
-def _contrast_db(wanted: NDArray[np.bool_], level: Floats) -> float | None:
-    """Weakest wanted dot over strongest unwanted one; infinite over silence, None when the frame lacks either."""
-    if not wanted.any() or wanted.all():
-        return None
-    weakest, strongest = np.abs(level[wanted]).min(), np.abs(level[~wanted]).max()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(20 * np.log10(weakest / strongest))
 
 
 def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:

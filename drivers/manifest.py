@@ -16,7 +16,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device, Outcome
+from chainsim import Closure, Device, Outcome
 from planner import ChainState, FramePlan
 
 from .channels import Channel, channels_of
@@ -41,6 +41,10 @@ class FrameMark:
     ----------
     start_s, settled_s, end_s : the pattern stands from settled_s to end_s.
     omega : float64, shape (rows,), read-only, each row's drive frequency over f0.
+    tones : further frequencies over f0 at which each row is to move as much; mostly none.
+    phase : float64, shape (rows, cols), read-only, wanted phases in radians, NaN where any will do; those of rows
+        with one omega may all be shifted alike.
+    moving : for each row whether its target is an amplitude at omega; else it is a deflection.
     target : float64, shape (rows, cols), read-only, amplitude in units of full scale.
     cells, text : what is shown, as Unicode Braille and as source text. outcome : how planning it went.
     page : frames of one page are superposed by the reader. span : (start, end) of `text` in the source.
@@ -56,6 +60,9 @@ class FrameMark:
     outcome: Outcome
     page: int
     span: tuple[int, int]
+    tones: tuple[tuple[float, ...], ...]
+    phase: Floats
+    moving: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -93,9 +100,13 @@ class Manifest:
 
         Returns
         -------
-        float64, shape (S, rows, cols); ``[:, r, m]`` couples actuator m-1 of row r into m, and column 0 is 0.
+        float64, shape (S, rows, cols); ``[:, r, m]`` couples actuator m-1 of row r into m. A chain's first is 0,
+        or where chains are rings, whose closing link is set with the first, that of its second.
         """
-        return self._lam.at(times_s)
+        lam = self._lam.at(times_s)
+        if self.device.coupling.closure is Closure.RING and self.device.chain_length > 1:
+            lam[:, :, :: self.device.chain_length] = lam[:, :, 1 :: self.device.chain_length]
+        return lam
 
     def check_digest(self, path: Path) -> None:
         """Compare the bytes of the samples file at `path` with `digest`.
@@ -224,7 +235,7 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
     assert frame.frame is not None
     per_row = device.chains_per_row
     rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
-    return {
+    mark = {
         "start_s": frame.start_s,
         "settled_s": frame.settled_s,
         "end_s": frame.end_s,
@@ -236,6 +247,23 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         "page": frame.frame.page,
         "span": list(frame.frame.span),
     }
+    if any(state.tones for state in frame.states):
+        mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
+    if any(state.phase is not None for state in frame.states):
+        mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]
+    moving = [any(state.moving for state in row) for row in rows]
+    if device.bias == "actuator" and any(moving):
+        for index, row in enumerate(rows):
+            if moving[index] and any(np.any(state.bias) for state in row):
+                raise WaveformError(f"frame {number}, row {index}: some of its chains vibrate and some stand still")
+        mark["moving"] = moving
+    return mark
+
+
+def _phases(state: ChainState) -> list[float | None]:
+    if state.phase is None:
+        return [None] * len(state.target)
+    return [None if np.isnan(phase) else _rounded(phase) for phase in state.phase.tolist()]
 
 
 def _common_omega(states: tuple[ChainState, ...], place: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -56,6 +57,9 @@ class _Frame(_Part):
     outcome: Annotated[Outcome, Field(strict=False)]
     page: Index = 0
     span: Annotated[list[Index], Field(min_length=2, max_length=2)] = [0, 0]
+    tones: list[list[Positive]] | None = None
+    phase: list[list[Finite | None]] | None = None
+    moving: list[bool] | None = None
 
 
 class _File(_Part):
@@ -172,6 +176,12 @@ class _Check:
             self._refuse(f"{place}.omega", f"expected {rows} numbers, one for each row, got {len(frame.omega)}")
         if len(frame.target) != rows or any(len(row) != cols for row in frame.target):
             self._refuse(f"{place}.target", f"expected {rows} rows of {cols} numbers")
+        for name, value in (("tones", frame.tones), ("moving", frame.moving)):
+            if value is not None and len(value) != rows:
+                self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
+        phase = frame.phase
+        if phase is not None and (len(phase) != rows or any(len(row) != cols for row in phase)):
+            self._refuse(f"{place}.phase", f"expected {rows} rows of {cols} numbers or null")
         if not frame.start_s <= frame.settled_s <= frame.end_s:
             times = f"start_s {frame.start_s}, settled_s {frame.settled_s}, end_s {frame.end_s}"
             self._refuse(place, f"{times} are not in order")
@@ -193,12 +203,14 @@ def _manifest(file: _File) -> Manifest:
         device=file.device,
         channels=tuple(Channel(c.index, c.role, c.row, c.col, c.volts_per_unit) for c in file.channels),
         coupling=tuple(CouplingEvent(e.t_s, e.row, tuple(e.lam), e.ramp_s) for e in file.coupling),
-        frames=tuple(_mark(frame) for frame in file.frames),
+        frames=tuple(_mark(frame, file.device) for frame in file.frames),
         encoding=file.encoding,
     )
 
 
-def _mark(frame: _Frame) -> FrameMark:
+def _mark(frame: _Frame, device: Device) -> FrameMark:
+    any_phase = [[None] * device.cols] * device.rows
+    phase = [[math.nan if one is None else one for one in row] for row in frame.phase or any_phase]
     return FrameMark(
         start_s=frame.start_s,
         settled_s=frame.settled_s,
@@ -210,6 +222,9 @@ def _mark(frame: _Frame) -> FrameMark:
         outcome=frame.outcome,
         page=frame.page,
         span=(frame.span[0], frame.span[1]),
+        tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
+        phase=_frozen(phase),
+        moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
     )
 
 

@@ -84,9 +84,14 @@ def _check_state(where: str, device: Device, state: ChainState) -> None:
     _check_array(f"{where}: lam", state.lam, (n - 1,))
     if device.bias == "none" and np.any(state.bias):
         raise WaveformError(f"{where}: a bias of {state.bias[np.flatnonzero(state.bias)[0]]}, but {_no_bias(device)}")
-    if not (np.isfinite(state.omega) and state.omega > 0):
-        raise WaveformError(f"{where}: omega: expected a finite number > 0, got {state.omega}")
-    hertz = state.omega * device.f0_hz
+    for omega in (state.omega, *(tone.omega for tone in state.tones)):
+        _check_omega(where, device, omega)
+
+
+def _check_omega(where: str, device: Device, omega: float) -> None:
+    if not (np.isfinite(omega) and omega > 0):
+        raise WaveformError(f"{where}: omega: expected a finite number > 0, got {omega}")
+    hertz = omega * device.f0_hz
     if 2 * hertz >= device.amplifier.rate_hz:
         raise WaveformError(
             f"{where}: a drive at {hertz:.6g} Hz needs more than {2 * hertz:.6g} samples a second, the amplifier of "
@@ -105,6 +110,11 @@ def _check_ramp(where: str, device: Device, ramp: Ramp, longest: float) -> None:
     ):
         if array is not None:
             _check_array(f"{where}: ramp.{name}", array, shape)
+    for tone in ramp.tones:
+        _check_omega(f"{where}: ramp.tones", device, tone.omega)
+        _check_array(f"{where}: ramp.tones.epsilon", tone.epsilon, ramp.t_s.shape)
+        if tone.epsilon_slope is not None:
+            _check_array(f"{where}: ramp.tones.epsilon_slope", tone.epsilon_slope, ramp.t_s.shape)
     if ramp.bias is not None and device.bias == "none":
         raise WaveformError(f"{where}: ramp.bias is given, but {_no_bias(device)}")
     if (ramp.lam is None) != (ramp.lam_t_s is None):

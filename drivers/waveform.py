@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from .timeline import Stretch, stretches
 __all__ = ["Waveform"]
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 # Samples of all channels computed at once: about a megabyte of float64, which stays in the cache.
 CHUNK_VALUES = 1 << 17
@@ -28,9 +30,10 @@ CHUNK_VALUES = 1 << 17
 class Waveform:
     """The amplifier voltages that carry out a plan.
 
-    The drive of a chain is ``Re(E(t) e^{i omega tau}) / epsilon_per_volt`` volts, tau = 2 pi f0_hz t, with E
-    the ramp's envelope while it lasts and the state's epsilon after it; the bias of an actuator is
-    ``b(t) / bias_per_volt``. The time of sample k is k / rate_hz, counted from the start of the plan.
+    The drive of a chain is ``Re(E(t) e^{i omega tau}) / epsilon_per_volt`` volts, summed over its tones,
+    tau = 2 pi f0_hz t, with E the ramp's envelope while it lasts and the state's epsilon after it; the bias of an
+    actuator is ``b(t) / bias_per_volt``. The time of sample k is k / rate_hz, counted from the start of the plan.
+    Where the converter has steps, the nearest is taken.
 
     Attributes
     ----------
@@ -108,16 +111,20 @@ class Waveform:
             first = equal.setdefault((id(state), id(ramp)), number)
             if first < number:
                 out[number] = out[first]
-            elif state.epsilon or (ramp is not None and ramp.epsilon is not None):
-                if state.omega not in carriers:
-                    carriers[state.omega] = _Carrier.of(state.omega, device.tau_per_s * time_s, device)
-                _drive(state, ramp, since_s, carriers[state.omega], out[number])
+            else:
+                for tone in _tones(state, ramp):
+                    if tone.omega not in carriers:
+                        carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
+                    _drive(tone, ramp, since_s, carriers[tone.omega], out[number])
         drives = out[: len(frame.states)]
         drives /= device.epsilon_per_volt
         if device.bias == "actuator":
             biases = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
             for state, ramp, rows in zip(frame.states, frame.ramps, biases, strict=True):
                 _bias(state, ramp, since_s, device.bias_per_volt, rows)
+        if step := device.amplifier.volt_step:
+            np.rint(out / step, out=out)
+            out *= step
         return out
 
 
@@ -144,17 +151,39 @@ def _ramp_samples(ramp: Ramp | None, since_s: Floats) -> int:
     return 0 if ramp is None else int(np.searchsorted(since_s, ramp.duration_s))
 
 
-def _drive(state: ChainState, ramp: Ramp | None, since_s: Floats, carrier: _Carrier, out: Floats) -> None:
-    """Put the dimensionless drive force of one chain into `out`, shape (S,), which is zero."""
+class _DriveTone(NamedTuple):
+    """One tone of a drive: what it holds after the ramp, and its envelope during it."""
+
+    omega: float
+    held: complex
+    nodes: Complexes | None
+    slopes: Complexes | None
+
+
+def _tones(state: ChainState, ramp: Ramp | None) -> Iterator[_DriveTone]:
+    """The tones that sound, each frequency once."""
+    held = {state.omega: state.epsilon} | {tone.omega: tone.epsilon for tone in state.tones}
+    way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
+    if ramp is not None:
+        way = {state.omega: (ramp.epsilon, ramp.epsilon_slope)}
+        way |= {tone.omega: (tone.epsilon, tone.epsilon_slope) for tone in ramp.tones}
+    for omega in dict.fromkeys([*held, *way]):
+        tone = _DriveTone(omega, held.get(omega, 0j), *way.get(omega, (None, None)))
+        if tone.held or tone.nodes is not None:
+            yield tone
+
+
+def _drive(tone: _DriveTone, ramp: Ramp | None, since_s: Floats, carrier: _Carrier, out: Floats) -> None:
+    """Add one tone of the dimensionless drive force of one chain to `out`, shape (S,)."""
     end = _ramp_samples(ramp, since_s)
-    if end and ramp is not None and ramp.epsilon is not None:
-        envelope = carrier.gain * curve(since_s[:end], ramp.t_s, ramp.epsilon, ramp.epsilon_slope)
-        if ramp.epsilon_slope is not None:
-            envelope += 1j * carrier.lead_s * np.interp(since_s[:end], ramp.t_s, ramp.epsilon_slope)
-        out[:end] = envelope.real * carrier.cos[:end] - envelope.imag * carrier.sin[:end]
-    if state.epsilon and end < len(out):
-        held = carrier.gain * state.epsilon
-        out[end:] = held.real * carrier.cos[end:] - held.imag * carrier.sin[end:]
+    if end and ramp is not None and tone.nodes is not None:
+        envelope = carrier.gain * curve(since_s[:end], ramp.t_s, tone.nodes, tone.slopes)
+        if tone.slopes is not None:
+            envelope += 1j * carrier.lead_s * np.interp(since_s[:end], ramp.t_s, tone.slopes)
+        out[:end] += envelope.real * carrier.cos[:end] - envelope.imag * carrier.sin[:end]
+    if tone.held and end < len(out):
+        held = carrier.gain * tone.held
+        out[end:] += held.real * carrier.cos[end:] - held.imag * carrier.sin[end:]
 
 
 def _bias(state: ChainState, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chainsim import Device
 
 from .envelopes import change, rise
-from .floor import idle_profiles
+from .floor import EQUAL, LOWER, idle_profiles
 from .links import drive_for, links_for
 
 __all__ = ["NODES_PER_RAMP", "Band", "choose_band"]
@@ -29,12 +29,14 @@ STEADY_SHARE = 0.5
 class Band:
     """What is common to all patterns of a device: drive frequency, ramp length, highest level of an unraised dot.
 
-    `lacking` is empty, or one clause that says what the device lacks for patterns with this contrast.
+    `lower` is the deepest level of an unraised dot in units of that floor. `lacking` is empty, or one clause that
+    says what the device lacks for patterns with this contrast.
     """
 
     omega: float
     ramp_s: float
     floor: float
+    lower: float = LOWER
     lacking: str = ""
 
 
@@ -42,21 +44,24 @@ def choose_band(device: Device, contrast_db: float) -> Band:
     """The highest drive frequency at which every change between on/off patterns can be made.
 
     Detuning buys short ramps and robustness against spread, and costs volts and reach of the links; so the
-    highest frequency the device can pay for. A single actuator is driven likewise, and has no floor.
+    highest frequency the device can pay for. Where dots that idle at half the floor are out of reach, all idle
+    at it. A single actuator is driven likewise, and has no floor.
     """
     floor = 0.0 if device.chain_length == 1 else 10.0 ** (-contrast_db / 20)
     lacking = ""
-    for omega in np.linspace(device.omega.max, device.omega.min, CANDIDATES):
-        ramp_s = _ramp_s(device, float(omega))
-        found = _lack(device, float(omega), ramp_s, floor)
-        if not found:
-            return Band(float(omega), ramp_s, floor)
-        lacking = lacking or found
-    return Band(device.omega.max, LONGEST_RAMP_S, floor, lacking)
+    for lower in (LOWER, EQUAL):
+        lacking = ""
+        for omega in np.linspace(device.omega.max, device.omega.min, CANDIDATES):
+            for ramp_s in _ramps_s(device, float(omega)):
+                found = _lack(device, float(omega), ramp_s, _probes(device, floor, lower))
+                if not found:
+                    return Band(float(omega), ramp_s, floor, lower)
+                lacking = lacking or found
+    return Band(device.omega.max, LONGEST_RAMP_S, floor, EQUAL, lacking)
 
 
-def _ramp_s(device: Device, omega: float) -> float:
-    """Length of a ramp with enough beats between drive and stage resonance to leave no residue.
+def _ramps_s(device: Device, omega: float) -> list[float]:
+    """Lengths to try, of which the shorter has enough beats between drive and stage resonance to leave no residue.
 
     The smooth blends have little content beyond 2 + 0.9 n beats per ramp, measured under the full equations
     for n = 1 and 6; what content they have there, every further stage magnifies.
@@ -67,22 +72,24 @@ def _ramp_s(device: Device, omega: float) -> float:
     beat_hz = abs(omega - resonance) * device.f0_hz
     beats = 2.0 + 0.9 * device.chain_length
     shortest = beats / beat_hz if beat_hz else math.inf
-    return min(shortest, LONGEST_RAMP_S) if device.chain_length == 1 else shortest
+    if device.chain_length == 1:
+        shortest = min(shortest, LONGEST_RAMP_S)
+    # Links that cannot follow in that time, as in short chains, may in a longer one.
+    return [shortest, LONGEST_RAMP_S] if shortest < LONGEST_RAMP_S else [shortest]
 
 
-def _probes(device: Device, floor: float) -> Floats:
+def _probes(device: Device, floor: float, lower: float) -> Floats:
     """On/off profiles with every kind of step: all, none, alternating, blocks."""
     m = np.arange(device.chain_length)
     shapes = np.array([m >= 0, m < 0, m % 2 == 0, m % 2 == 1, m // 2 % 2 == 0, m // 2 % 2 == 1])
-    deepest = [idle_profiles(shape.astype(np.float64), floor)[-1] for shape in shapes]
+    deepest = [idle_profiles(shape.astype(np.float64), floor, lower)[-1] for shape in shapes]
     return np.asarray(deepest) * device.full_scale
 
 
-def _lack(device: Device, omega: float, ramp_s: float, floor: float) -> str:
-    """What the device lacks at `omega`, or ""."""
+def _lack(device: Device, omega: float, ramp_s: float, probes: Floats) -> str:
+    """What the device lacks at `omega` for changes between `probes`, or ""."""
     if ramp_s > LONGEST_RAMP_S:
         return f"frame changes of {ramp_s:.2g} s are too slow; it lacks detuning (a higher omega.max)"
-    probes = _probes(device, floor)
     chain, allowed = device.chain, device.coupling.lam
     links = links_for(chain, probes, omega)
     if not np.all(np.isfinite(links)):

@@ -19,7 +19,7 @@ import numpy as np
 
 from chainsim import Device, Outcome
 
-from .plan import ChainState, Margins, Ramp
+from .plan import ChainState, Margins, Ramp, Tone, ToneRamp
 
 __all__ = ["PlanCache", "cache_path"]
 
@@ -58,6 +58,7 @@ class PlanCache:
         text = json.dumps([profile, contrast_db], sort_keys=True)
         self._scope = hashlib.sha256(_code_digest() + text.encode()).digest()
         self._connection: sqlite3.Connection | None = None
+        self._damaged = False
         try:
             path = cache_path()
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,10 +89,24 @@ class PlanCache:
                     cursor.execute("SELECT value FROM plans WHERE key = ?", (self._key(item),)).fetchone()
                     for item in items
                 ]
-            return [None if row is None else _unpacked(row[0]) for row in rows]
-        except (sqlite3.Error, ValueError, LookupError, TypeError, AttributeError, EOFError) as error:
+            return [None if row is None else self._sound(item, row[0]) for item, row in zip(items, rows, strict=True)]
+        except sqlite3.Error as error:
             self._give_up(error)
             return [None] * len(items)
+
+    def _sound(self, item: bytes, raw: object) -> ChainState | Ramp | None:
+        """What a row holds; a damaged one is deleted, so that it is planned and kept again."""
+        try:
+            if not isinstance(raw, bytes):
+                raise TypeError(f"a value of type {type(raw).__name__}")
+            return _unpacked(raw)
+        except (ValueError, LookupError, TypeError, AttributeError, EOFError) as error:
+            if not self._damaged:
+                log.warning("plan cache %s: damaged plans (%s) are made again", cache_path(), error)
+            self._damaged = True
+            if self._connection is not None:
+                self._connection.execute("DELETE FROM plans WHERE key = ?", (self._key(item),))
+            return None
 
     def keep(self, items: Iterable[tuple[bytes, ChainState | Ramp]]) -> None:
         """Keep plans for later runs."""
@@ -110,19 +125,8 @@ class PlanCache:
 
 def _packed(value: ChainState | Ramp) -> bytes:
     """Plain values as a line of JSON, then the arrays; no pickle."""
-    plain: dict[str, Any] = {"type": type(value).__name__}
     arrays: list[np.ndarray[Any, Any]] = []
-    for field in fields(value):
-        item = getattr(value, field.name)
-        if isinstance(item, np.ndarray):
-            plain[field.name] = {"array": len(arrays)}
-            arrays.append(item)
-        elif isinstance(item, Margins):
-            plain[field.name] = {"margins": [item.volts, item.well, item.noise_gain]}
-        elif isinstance(item, complex):
-            plain[field.name] = {"complex": [item.real, item.imag]}
-        else:
-            plain[field.name] = item
+    plain = _plain(value, arrays)
     out = io.BytesIO()
     out.write(json.dumps(plain).encode() + b"\n")
     for array in arrays:
@@ -130,20 +134,47 @@ def _packed(value: ChainState | Ramp) -> bytes:
     return out.getvalue()
 
 
+_PARTS = {kind.__name__: kind for kind in (ChainState, Margins, Ramp, Tone, ToneRamp)}
+
+
+def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+    if isinstance(item, np.ndarray):
+        arrays.append(item)
+        return {"array": len(arrays) - 1}
+    if type(item) in _PARTS.values():
+        return {"type": type(item).__name__} | {
+            field.name: _plain(getattr(item, field.name), arrays) for field in fields(item)
+        }
+    if isinstance(item, complex):
+        return {"complex": [item.real, item.imag]}
+    return [_plain(one, arrays) for one in item] if isinstance(item, tuple) else item
+
+
 def _unpacked(raw: bytes) -> ChainState | Ramp:
     source = io.BytesIO(raw)
     plain = json.loads(source.readline())
-    kind: type[ChainState] | type[Ramp] = {"ChainState": ChainState, "Ramp": Ramp}[plain.pop("type")]
-    for name, item in plain.items():
-        if isinstance(item, dict):
-            if "array" in item:
-                array = np.load(source, allow_pickle=False)
-                array.flags.writeable = False
-                plain[name] = array
-            elif "margins" in item:
-                plain[name] = Margins(*item["margins"])
-            else:
-                plain[name] = complex(*item["complex"])
-    if "outcome" in plain:
-        plain["outcome"] = Outcome(plain["outcome"])
-    return kind(**plain)
+    # Arrays lie in the order of their numbers.
+    arrays = []
+    while source.tell() < len(raw):
+        arrays.append(np.load(source, allow_pickle=False))
+        arrays[-1].flags.writeable = False
+    value = _whole(plain, arrays)
+    if not isinstance(value, ChainState | Ramp):
+        raise ValueError("neither a state nor a ramp")
+    return value
+
+
+def _whole(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+    if isinstance(item, list):
+        return tuple(_whole(one, arrays) for one in item)
+    if not isinstance(item, dict):
+        return item
+    if "array" in item:
+        return arrays[item["array"]]
+    if "complex" in item:
+        return complex(*item["complex"])
+    found = {name: _whole(one, arrays) for name, one in item.items()}
+    kind = found.pop("type")
+    if "outcome" in found:
+        found["outcome"] = Outcome(found["outcome"])
+    return _PARTS[kind](**found)

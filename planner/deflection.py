@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Outcome, Setting, solve
 
 from . import jets
+from .margins import WELL_SHARE
 from .plan import ChainState, Margins, Ramp
 from .strategy import Strategy
 
@@ -52,6 +53,9 @@ class Deflection(Strategy):
         """Static settings for `targets`, checked by the static solver."""
         device = self.device
         biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
+        step = device.amplifier.volt_step * device.bias_per_volt
+        if step:
+            biases = step * np.rint(biases / step)
         lam = np.full(device.chain_length - 1, device.coupling.lam.min)
         setting = Setting.of(device.chain, epsilon=0.0, lam=device.coupling.lam.min, omega=1.0, bias=biases)
         rung = "static" if device.coupling.closure is Closure.OPEN else "auto"
@@ -69,6 +73,7 @@ class Deflection(Strategy):
                 error=float(error[i]),
                 margins=self._margins(biases[i]),
                 outcome=self._outcome(response.outcome[i], targets[i], biases[i]),
+                lacking=self._lacking(targets[i], biases[i]),
             )
             for i in range(len(targets))
         ]
@@ -80,19 +85,27 @@ class Deflection(Strategy):
         return Margins(volts=largest / self.device.bias_max, well=largest / fold)
 
     def _outcome(self, solved: Outcome, target: Floats, bias: Floats) -> Outcome:
+        return Outcome.UNREACHABLE if solved is Outcome.OK and self._lacking(target, bias) else solved
+
+    def _lacking(self, target: Floats, bias: Floats) -> str:
         device, margins = self.device, self._margins(bias)
+        if margins.volts > 1:
+            share = f"{100 * margins.volts:.0f} % of the amplifier's volts"
+            return f"it takes {share}; it lacks volts, or a lower full_scale"
         # Past the fold the bias that balances a deflection falls again, but nothing stable stands there.
         stiffness = 1.0 + device.coupling.lam.min + 3 * device.beta * (target * device.full_scale) ** 2
-        if solved is Outcome.OK and (max(margins.volts, margins.well) > 1 or np.any(stiffness <= 0)):
-            return Outcome.UNREACHABLE
-        return solved
+        if np.any(stiffness <= 0):
+            return "it lies beyond the fold of the softening well; it lacks depth of the well, or a lower full_scale"
+        if margins.well > WELL_SHARE:
+            return (
+                f"its bias is {100 * margins.well:.0f} % of that at which the well folds, {100 * WELL_SHARE:.0f} % are "
+                "allowed; it lacks depth of the well, or a lower full_scale"
+            )
+        return ""
 
     def note(self) -> str:
         """What is lacking when a deflection cannot be held."""
-        return (
-            f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well; "
-            "lower full_scale in the profile."
-        )
+        return f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well."
 
     def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
         """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""

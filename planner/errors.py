@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["DwellTooShort", "PlanError", "SceneDoesNotFit"]
+__all__ = ["ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit"]
 
 
 class PlanError(Exception):
@@ -20,4 +20,11 @@ class DwellTooShort(PlanError, ValueError):
     """A frame is over before its pattern could stand.
 
     Example: ``--dwell 0.2`` on a device whose frame changes take 0.34 s.
+    """
+
+
+class ContrastError(PlanError, ValueError):
+    """A contrast between raised and unraised dots that is none.
+
+    Example: ``--contrast 0``.
     """

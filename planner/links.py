@@ -55,7 +55,8 @@ def detuning_gain(chain: Chain, amplitude: Floats, lam: Floats, omega: float) ->
 
     Parameters
     ----------
-    amplitude : float64, shape (P, n), dimensionless, > 0. lam : float64, shape (P, n-1), the links that hold it.
+    amplitude : float64, shape (P, n), dimensionless, >= 0 (actuators at 0 do not count), the first > 0.
+    lam : float64, shape (P, n-1), the links that hold it.
 
     Returns
     -------
@@ -67,5 +68,6 @@ def detuning_gain(chain: Chain, amplitude: Floats, lam: Floats, omega: float) ->
     stage = np.abs(stiffness[:, None, :] - at**2 + 1j * chain.delta * at)
     forward = np.concatenate([open_end + 1.0, lam], axis=1)
     gains = np.cumprod(forward[:, None, :] / stage, axis=2)
-    standing = amplitude / drive_for(chain, amplitude[:, :1], omega)
-    return np.asarray(np.max(gains / standing[:, None, :], axis=(1, 2)))
+    standing = (amplitude / drive_for(chain, amplitude[:, :1], omega))[:, None, :]
+    silent = standing == 0
+    return np.asarray(np.max(np.where(silent, 0.0, gains / np.where(silent, 1.0, standing)), axis=(1, 2)))

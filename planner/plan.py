@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import Frame
 
-__all__ = ["ChainState", "FramePlan", "Margins", "Plan", "Ramp"]
+__all__ = ["ChainState", "FramePlan", "Margins", "Plan", "Ramp", "Tone", "ToneRamp"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -25,15 +25,36 @@ class Margins:
     Attributes
     ----------
     volts : peak voltage over the amplifier's; 1 is at the limit.
-    well : largest deflection over the limit of the softening well (static fold for a bias, hilltop for a
-        vibration); 1 is at the limit, 0 unless beta < 0.
+    well : of a deflection the largest bias over the bias of the static fold, of a vibration the largest
+        deflection over that of the hilltop; 1 is at the limit, 0 unless beta < 0.
     noise_gain : how many times more a disturbance on the drive, at the worst frequency and lasting for
         ever, is magnified than the drive itself is, at the worst actuator; 1 where nothing vibrates.
+    slew : fastest change of the steady drive over the amplifier's; 1 is at the limit.
+    multiplier : modulus of the largest Floquet multiplier of the motion; below 1 where it is stable, 0 where
+        nothing vibrates or no multipliers are known.
     """
 
     volts: float
     well: float
     noise_gain: float = 1.0
+    slew: float = 0.0
+    multiplier: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tone:
+    """One more tone of a drive: force = Re(epsilon e^{i omega tau}), tau from the start of the whole plan.
+
+    Attributes
+    ----------
+    phasor : complex128, shape (n,), predicted amplitudes at omega, dimensionless.
+    side : it is not itself wanted, but keeps those that are at their amplitudes.
+    """
+
+    omega: float
+    epsilon: complex
+    phasor: Complexes
+    side: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,6 +69,11 @@ class ChainState:
     bias : float64, shape (n,), DC force on each actuator.
     phasor : complex128, shape (n,), predicted first harmonic, dimensionless. mean : float64, shape (n,).
     error : predicted worst deviation from `target`, in units of full scale.
+    phase : float64, shape (n,), wanted phases in radians, NaN where any will do; None where none matters. Phases
+        are those of the motion at omega; one that is common to all chains at that omega makes no difference.
+    tones : further tones of the drive; `target` is then the largest amplitude that passes by, which the tones
+        make in equal parts, side tones apart.
+    lacking : one clause on what the device lacks for the target, empty when it can make it or the strategy says it.
     """
 
     target: Floats
@@ -60,6 +86,28 @@ class ChainState:
     error: float
     margins: Margins
     outcome: Outcome
+    phase: Floats | None = None
+    tones: tuple[Tone, ...] = ()
+    lacking: str = ""
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target is an amplitude of vibration, not a deflection."""
+        return bool(self.epsilon) or bool(self.tones)
+
+
+@dataclass(frozen=True)
+class ToneRamp:
+    """The envelope of one more tone at the nodes of a ramp.
+
+    Attributes
+    ----------
+    omega : its frequency over f0. epsilon, epsilon_slope : complex128, shape (K,), as in `Ramp`.
+    """
+
+    omega: float
+    epsilon: Complexes
+    epsilon_slope: Complexes | None = None
 
 
 @dataclass(frozen=True)
@@ -72,11 +120,13 @@ class Ramp:
     ----------
     t_s : float64, shape (K,), seconds from the start of the frame; first 0, last the ramp's length.
     epsilon : complex128, shape (K,), drive envelope: force = Re(epsilon e^{i omega tau}), tau from the
-        start of the whole plan; `epsilon_slope` per second. None when the drive stays zero.
+        start of the whole plan, omega that of the state it leads to; `epsilon_slope` per second. None when the
+        drive stays zero.
     bias : float64, shape (K, n); `bias_slope` per second. None when no bias changes.
     lam_t_s : float64, shape (L,); lam : float64, shape (L, n-1), the links. None when they jump to the new
         state's values at the start of the frame.
     lacking : one clause on what the device lacks for this way, empty when it can go it.
+    tones : envelopes at other frequencies, which add to the drive.
     """
 
     t_s: Floats
@@ -87,6 +137,7 @@ class Ramp:
     lam_t_s: Floats | None = None
     lam: Floats | None = None
     lacking: str = ""
+    tones: tuple[ToneRamp, ...] = ()
 
     @property
     def duration_s(self) -> float:

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
 from encoders import Frame, Scene
 
-from .cache import PlanCache
-from .errors import DwellTooShort, SceneDoesNotFit
-from .plan import ChainState, FramePlan, Plan, Ramp
-from .strategy import Strategy, strategy_for
+from .chains import Chains
+from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
+from .frame_change import Change, change_to
+from .plan import ChainState, FramePlan, Plan
 
 __all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
 
-Floats = NDArray[np.float64]
-
 DEFAULT_CONTRAST_DB = 20.0
-# Ramps kept in memory: all 64 x 64 of a chain of six would fit.
-MOST_RAMPS = 4096
 
 
 def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CONTRAST_DB) -> Plan:
@@ -36,7 +30,11 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CON
     ------
     SceneDoesNotFit
         When the scene was laid out for another grid.
+    ContrastError
+        When the contrast is not above 0.
     """
+    if not (math.isfinite(contrast_db) and contrast_db > 0):
+        raise ContrastError(f"contrast: expected a number of decibels above 0, got {contrast_db:g}; 20 is usual")
     shape = (scene.shape.rows, scene.shape.cols)
     if shape != (device.rows, device.cols):
         raise SceneDoesNotFit(
@@ -51,110 +49,52 @@ class _Frames:
 
     def __init__(self, scene: Scene, device: Device, contrast_db: float) -> None:
         self._scene = scene
-        self._chains = _Chains(strategy_for(device, contrast_db), PlanCache(device, contrast_db))
+        self._chains = Chains(device, contrast_db)
         self._device = device
 
     def __iter__(self) -> Iterator[FramePlan]:
         device, chains = self._device, self._chains
         rate = device.amplifier.rate_hz
-        keys = [bytes(8 * device.chain_length)] * (device.rows * device.chains_per_row)
+        held = [chains.rest] * (device.rows * device.chains_per_row)
         position = 0
         for frame in self._scene.frames:
-            wishes = np.abs(frame.pattern.amplitude).reshape(-1, device.chain_length)
-            before, keys = keys, chains.held(wishes, keys)
-            ramps = chains.ramps(before, keys)
+            change = change_to(chains, held, chains.hold(frame.pattern, held))
+            # What cannot be held is not played, and the next frame begins at rest.
+            played = all(state.outcome is Outcome.OK for state in change.states)
+            held = change.held if played else [chains.rest] * len(held)
             samples = max(1, round(frame.dwell_s * rate))
-            yield self._frame(frame, position, samples, keys, ramps)
+            yield self._frame(frame, position, samples, change)
             position += samples
-        silence = [bytes(8 * device.chain_length)] * len(keys)
-        ramps = chains.ramps(keys, silence)
-        if any(ramp is not None for ramp in ramps):
-            yield self._frame(None, position, int(chains.strategy.ramp_s * rate) + 2, silence, ramps)
+        change = change_to(chains, held, [chains.rest] * len(held))
+        if any(ramp is not None for ramp in change.ramps):
+            longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
+            yield self._frame(None, position, int(longest * rate) + 2, change)
 
-    def _frame(
-        self, frame: Frame | None, position: int, samples: int, keys: list[bytes], ramps: list[Ramp | None]
-    ) -> FramePlan:
+    def _frame(self, frame: Frame | None, position: int, samples: int, change: Change) -> FramePlan:
         rate = self._device.amplifier.rate_hz
-        longest = max((ramp.duration_s for ramp in ramps if ramp is not None), default=0.0)
+        longest = max((ramp.duration_s for ramp in change.ramps if ramp is not None), default=0.0)
         start_s, end_s = position / rate, (position + samples) / rate
         if longest >= end_s - start_s:
             raise DwellTooShort(
                 f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell)"
             )
-        states = tuple(self._chains.state(key) for key in keys)
-        whole = FramePlan(frame, start_s, start_s + longest, end_s, states, tuple(ramps))
+        whole = FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps)
         return self._judged(whole)
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
             if state.outcome is not Outcome.OK:
-                unreachable = state.outcome is Outcome.UNREACHABLE
-                note = self._chains.strategy.note() if unreachable else state.outcome.sentence
-                return replace(plan, outcome=state.outcome, note=note)
+                return replace(plan, outcome=state.outcome, note=self._note(state))
         for ramp in plan.ramps:
             if ramp is not None and ramp.lacking:
                 note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
         return plan
 
-
-class _Chains:
-    """States and ramps by target, each planned once: in this run, and from the cache in any run."""
-
-    def __init__(self, strategy: Strategy, cache: PlanCache) -> None:
-        self.strategy = strategy
-        self._cache = cache
-        self._states: dict[bytes, ChainState] = {}
-        self._ramps: dict[tuple[bytes, bytes], Ramp | None] = {}
-        self._held: dict[tuple[bytes, bool], bytes] = {}
-
-    def held(self, wishes: Floats, before: list[bytes]) -> list[bytes]:
-        """The targets (as bytes) that chains hold for wishes of shape (chains, n), given what they held."""
-        keys = []
-        for wish, previous in zip(wishes, before, strict=True):
-            ask = (wish.tobytes(), any(previous))
-            if ask not in self._held:
-                held = self.strategy.held(wish, ask[1])
-                self._held[ask] = np.ascontiguousarray(held, dtype=np.float64).tobytes()
-            keys.append(self._held[ask])
-        self._plan([key for key in dict.fromkeys(keys) if key not in self._states])
-        return keys
-
-    def state(self, key: bytes) -> ChainState:
-        """The state for a target."""
-        if key not in self._states:
-            self._plan([key])
-        return self._states[key]
-
-    def _plan(self, keys: list[bytes]) -> None:
-        found = self._cache.find([b"state" + key for key in keys]) if keys else []
-        missing = [key for key, state in zip(keys, found, strict=True) if state is None]
-        self._states.update((key, state) for key, state in zip(keys, found, strict=True) if state is not None)
-        if missing:
-            targets = np.array([np.frombuffer(key) for key in missing])
-            made = dict(zip(missing, self.strategy.states(targets), strict=True))
-            self._states.update(made)
-            self._cache.keep((b"state" + key, state) for key, state in made.items())
-
-    def ramps(self, before: list[bytes], after: list[bytes]) -> list[Ramp | None]:
-        """The ramps between targets, chain by chain."""
-        pairs = list(zip(before, after, strict=True))
-        missing = [pair for pair in dict.fromkeys(pairs) if pair[0] != pair[1] and pair not in self._ramps]
-        if len(self._ramps) + len(missing) > MOST_RAMPS:
-            self._ramps.clear()
-            missing = [pair for pair in dict.fromkeys(pairs) if pair[0] != pair[1]]
-        if missing:
-            found = self._cache.find([b"ramp" + one + other for one, other in missing])
-            self._ramps.update((pair, ramp) for pair, ramp in zip(missing, found, strict=True) if ramp is not None)
-            new = [pair for pair, ramp in zip(missing, found, strict=True) if ramp is None]
-            self._make(new)
-        return [self._ramps.get(pair) for pair in pairs]
-
-    def _make(self, pairs: list[tuple[bytes, bytes]]) -> None:
-        if not pairs:
-            return
-        made = self.strategy.ramps([self.state(one) for one, _ in pairs], [self.state(other) for _, other in pairs])
-        new = dict(zip(pairs, made, strict=True))
-        self._ramps.update(new)
-        self._cache.keep((b"ramp" + one + other, ramp) for (one, other), ramp in new.items() if ramp is not None)
+    def _note(self, state: ChainState) -> str:
+        if state.outcome is not Outcome.UNREACHABLE:
+            return state.outcome.sentence
+        if state.lacking:
+            return f"{self._device.name} cannot make this pattern: {state.lacking}."
+        return "" if self._chains.strategy is None else self._chains.strategy.note()

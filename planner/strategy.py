@@ -50,11 +50,11 @@ class Strategy(ABC):
         return ""
 
 
-def strategy_for(device: Device, contrast_db: float) -> Strategy:
-    """The strategy for amplitude patterns that `device` offers most with.
+def strategy_for(device: Device, contrast_db: float) -> Strategy | None:
+    """The strategy for amplitude patterns that `device` offers most with; None where it has none for any pattern.
 
     A bias per actuator makes any pattern statically; a lam per link, or no coupling at all, any pattern by
-    vibration; anything else makes none at will.
+    vibration; anything else makes only waves.
     """
     if device.bias == "actuator":
         from .deflection import Deflection
@@ -64,6 +64,4 @@ def strategy_for(device: Device, contrast_db: float) -> Strategy:
         from .vibration import Vibration
 
         return Vibration(device, contrast_db)
-    from .nearest import Nearest
-
-    return Nearest(device)
+    return None

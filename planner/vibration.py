@@ -17,6 +17,7 @@ from .envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
 from .floor import idle_profiles
 from .hermite import broken_line
 from .links import detuning_gain, links_for
+from .margins import WELL_SHARE, lacking_of, slew_of
 from .plan import ChainState, Margins, Ramp
 from .refine import Refined, refine
 from .strategy import Strategy
@@ -32,8 +33,6 @@ PIECE_S = 2.5e-3
 # Where a state magnifies disturbances this much, shorter ones: the line's error is one of them.
 FINE_PIECE_S = 1.5e-3
 DELICATE = 1e6
-# Largest share of the hilltop amplitude that a ramp may pass through.
-WELL_SHARE = 0.8
 
 
 class Vibration(Strategy):
@@ -61,7 +60,7 @@ class Vibration(Strategy):
         """
         if not started and not np.any(target):
             return target
-        profiles = idle_profiles(target, self.band.floor)
+        profiles = idle_profiles(target, self.band.floor, self.band.lower)
         if len(profiles) == 1:
             return np.asarray(profiles[0])
         amplitude = profiles * self.device.full_scale
@@ -109,6 +108,7 @@ class Vibration(Strategy):
             volts=abs(found.epsilon[i]) / device.epsilon_max,
             well=float(np.abs(found.phasor[i]).max()) / device.escape_amplitude,
             noise_gain=float(gain[0]),
+            slew=slew_of(device, abs(found.epsilon[i]), self.band.omega),
         )
         return ChainState(
             target=target,
@@ -121,12 +121,13 @@ class Vibration(Strategy):
             error=float(found.error[i]) / device.full_scale,
             margins=margins,
             outcome=self._outcome(found.outcome[i], found.lam[i], margins),
+            lacking="" if self.band.lacking else lacking_of(margins),
         )
 
     def _outcome(self, solved: Outcome, lam: Floats, margins: Margins) -> Outcome:
         allowed = self.device.coupling.lam
         outside = lam.size and (lam.min() < allowed.min or lam.max() > allowed.max)
-        if solved is Outcome.OK and (self.band.lacking or outside or margins.volts > 1):
+        if solved is Outcome.OK and (self.band.lacking or outside or lacking_of(margins)):
             return Outcome.UNREACHABLE
         return solved
 

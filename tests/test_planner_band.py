@@ -74,7 +74,7 @@ LACKING = {
     "steady_volts": (altered(volts=1.9 * steady_volts(LINKED)), "steady drive", "volts"),
     "ramp_volts": (
         # Twelve stages pass the way in on, each steeper than the next: the drive overshoots.
-        altered(chain_length=12, cols=12, f0_hz=300.0, volts=4 * steady_volts(LINKED)),
+        altered(chain_length=12, cols=12, f0_hz=260.0, volts=4 * steady_volts(LINKED)),
         "the way in needs",
         "volts",
     ),
@@ -123,3 +123,18 @@ def test_a_single_actuator_needs_no_detuning() -> None:
     band = choose_band(altered(single, omega=(0.999, 1.001)), 20.0)
     assert band.floor == 0.0
     assert band.ramp_s == LONGEST_RAMP_S
+
+
+def test_more_contrast_costs_the_deeper_floor() -> None:
+    """At 26 dB no links can idle at half the floor, but all at the floor they can."""
+    assert choose_band(LINKED, 20.0).lower == 0.5
+    band = choose_band(LINKED, 26.0)
+    assert band.lacking == ""
+    assert band.lower == 1.0
+
+
+@pytest.mark.parametrize("changes", [{"chain_length": 2}, {"chain_length": 3}, {"f0_hz": 250.0, "chain_length": 2}])
+def test_short_chains_take_the_time_they_need(changes: dict[str, object]) -> None:
+    band = choose_band(altered(**changes), 20.0)
+    assert band.lacking == ""
+    assert band.ramp_s <= LONGEST_RAMP_S

@@ -11,6 +11,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"PIL", "dask", "louis", "matplotlib", "numba", "rich", "scipy", "typer"}
 
+WAYS = {"planner.vibration", "planner.deflection", "planner.wave_state"}
+
 PLAN = """
 import numpy as np
 from chainsim import load_device
@@ -34,7 +36,7 @@ def test_importing_the_planner_loads_nothing_heavy() -> None:
     assert "planner.scene_plan" in loaded
     assert not {name.split(".")[0] for name in loaded} & HEAVY
     # Ways to make patterns are loaded for the device that has them.
-    assert not {"planner.vibration", "planner.deflection", "planner.nearest"} & loaded
+    assert not WAYS & loaded
 
 
 @pytest.mark.parametrize(
@@ -43,7 +45,7 @@ def test_importing_the_planner_loads_nothing_heavy() -> None:
         ("paper-6x6", 5, "deflection"),
         ("linked-6x6", 5, "vibration"),
         ("independent-6x6", 5, "vibration"),
-        ("paper-6x6-ring", 4, "nearest"),
+        ("paper-6x6-ring", 4, "wave_state"),
     ],
 )
 def test_planning_loads_nothing_heavy(
@@ -53,5 +55,5 @@ def test_planning_loads_nothing_heavy(
     monkeypatch.setenv("DOTWAVE_CACHE", str(tmp_path))
     loaded = loaded_by(PLAN.format(name=name, frames=frames))
     assert not {module.split(".")[0] for module in loaded} & HEAVY
-    ways = {module for module in loaded if module in {"planner.vibration", "planner.deflection", "planner.nearest"}}
+    ways = {module for module in loaded if module in WAYS}
     assert ways == {f"planner.{way}"}

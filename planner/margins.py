@@ -1,0 +1,65 @@
+"""How far a vibration stays from what it must not reach, and what the converter's steps do to it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Device, Response
+
+from .fit import Hold
+from .plan import Margins
+
+__all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
+
+Floats = NDArray[np.float64]
+
+# Largest share of the hilltop amplitude that is planned for: the escape margin is the rest.
+WELL_SHARE = 0.8
+# Points of the frequency grid on which noise is summed up, over so many widths of a resonance to either side.
+POINTS, WIDTHS = 801, 40.0
+
+
+def well_of(device: Device, response: Response) -> float:
+    """Largest deflection, its harmonics in line, over the hilltop; 0 unless beta < 0."""
+    return float(np.abs(response.harmonics[0]).sum(axis=0).max()) / device.escape_amplitude
+
+
+def slew_of(device: Device, epsilon: float, omega: float) -> float:
+    """Fastest change of a steady drive over the amplifier's slew."""
+    return epsilon / device.epsilon_per_volt * omega * device.tau_per_s / device.amplifier.slew_v_per_s
+
+
+def lacking_of(margins: Margins) -> str:
+    """What a state takes too much of, one clause; "" when nothing."""
+    if margins.volts > 1:
+        return f"it takes {100 * margins.volts:.0f} % of the amplifier's volts; it lacks volts"
+    if margins.slew > 1:
+        return f"it takes {100 * margins.slew:.0f} % of the amplifier's slew; it lacks slew"
+    if margins.well > WELL_SHARE:
+        share = f"{100 * margins.well:.0f} % of the way to the softening well's edge"
+        return f"it goes {share}, {100 * WELL_SHARE:.0f} % are allowed; it lacks depth of the well"
+    return ""
+
+
+def converter_error(device: Device, hold: Hold) -> float:
+    """Standard deviation of the worst actuator's amplitude under the rounding of a converter, dimensionless.
+
+    Rounding adds noise of step^2/12, spread evenly up to half the rate; small motions pass it on stage by stage.
+    """
+    step = device.amplifier.volt_step * device.epsilon_per_volt
+    if not step:
+        return 0.0
+    lam = np.concatenate([[0.0], hold.lam])
+    if device.coupling.closure is Closure.RING:
+        lam[0] = lam[1]
+    stiffness = 1.0 + lam
+    low, high = (float(np.sqrt(end(stiffness))) for end in (np.min, np.max))
+    omega = np.linspace(max(low - WIDTHS * device.delta, 0.05), high + WIDTHS * device.delta, POINTS)
+    stage = stiffness[:, None] - omega**2 + 1j * device.delta * omega
+    forward = np.concatenate([[1.0], lam[1:]])
+    gain = np.abs(np.cumprod(forward[:, None] / stage, axis=0)) ** 2
+    if device.coupling.closure is Closure.RING:
+        gain = gain / np.abs(1 - np.prod(lam[:, None] / stage, axis=0)) ** 2
+    density = step**2 / 12 / (np.pi * device.amplifier.rate_hz / device.tau_per_s)
+    return float(np.sqrt(density * np.trapezoid(gain, omega, axis=1).max()))

@@ -1,0 +1,86 @@
+"""The slow flow of an open chain under drive and links that vary, many drives at once.
+
+With z_m = Re(A_m e^{i omega tau}), one stage obeys ``A'' + D A' + K A = F`` with ``D = 2 i omega + delta``,
+``K = 1 - omega^2 + i delta omega + lam + (3/4) beta |A|^2 + (3/128) beta^2 |A|^4`` (the last term is the third
+harmonic's way back) and ``F = lam A_{m-1}``, or the drive. Second order: A'' is the derivative of the first order,
+``A' = (F - K A) / D``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Chain
+
+__all__ = ["Course", "follow_course"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Course:
+    """What is done to a chain on the way, at the 2 N + 1 ends and middles of N equal steps.
+
+    Attributes
+    ----------
+    epsilon, epsilon_slope : complex128, shape (2 N + 1, P), P drive envelopes and their derivatives in tau.
+    lam, lam_slope : float64, shape (2 N + 1, n), the links, the same for all P; ``lam[:, 0]`` is 0.
+    """
+
+    epsilon: Complexes
+    epsilon_slope: Complexes
+    lam: Floats
+    lam_slope: Floats
+
+
+def follow_course(
+    chain: Chain, omega: float, duration: float, course: Course, held: Complexes, softness: float
+) -> Complexes:
+    """Amplitudes on the way from rest, by Runge and Kutta's fourth-order steps.
+
+    Parameters
+    ----------
+    duration : in tau.
+    held : complex128, shape (n,), amplitudes at the end, whose stiffness is taken instead of the momentary one to the
+        part 1 - `softness`: at 0 the flow is linear and has the same end, at 1 it is the chain's.
+
+    Returns
+    -------
+    complex128, shape (N + 1, n, P), dimensionless; not finite where a motion grows without bound.
+    """
+    damping = 2j * omega + chain.delta
+    cubic, quintic = softness * 0.75 * chain.beta, softness * 3 / 128 * chain.beta**2
+    final = np.abs(held[:, None]) ** 2
+    lent = (1 - softness) * final * (0.75 * chain.beta + 3 / 128 * chain.beta**2 * final)
+    still = 1.0 - omega**2 + 1j * chain.delta * omega + lent
+
+    def slope(at: int, here: Complexes) -> Complexes:
+        lam, lam_slope = course.lam[at, :, None], course.lam_slope[at, :, None]
+        square = here.real**2 + here.imag**2
+        stiff = (still + lam) + square * (cubic + quintic * square)
+        force = np.empty_like(here)
+        force[0], force[1:] = course.epsilon[at], lam[1:] * here[:-1]
+        first = (force - stiff * here) / damping
+        turning = np.empty_like(here)
+        turning[0], turning[1:] = course.epsilon_slope[at], lam_slope[1:] * here[:-1] + lam[1:] * first[:-1]
+        stiffening = 2 * cubic * (here.real * first.real + here.imag * first.imag) + lam_slope
+        second = (turning - stiff * first - stiffening * here) / damping
+        return np.asarray(first - second / damping)
+
+    steps = (len(course.lam) - 1) // 2
+    h = duration / steps
+    here = np.zeros((len(held), course.epsilon.shape[1]), dtype=np.complex128)
+    trace = np.empty((steps + 1, *here.shape), dtype=np.complex128)
+    trace[0] = here
+    for k in range(steps):
+        a = slope(2 * k, here)
+        b = slope(2 * k + 1, here + h / 2 * a)
+        c = slope(2 * k + 1, here + h / 2 * b)
+        d = slope(2 * k + 2, here + h * c)
+        here = here + h / 6 * (a + 2 * (b + c) + d)
+        trace[k + 1] = here
+    return trace

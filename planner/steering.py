@@ -1,0 +1,150 @@
+"""The task of steering a chain from rest to a standing motion in a given time, on the slow flow.
+
+The drive is a smooth step to the steady drive plus quintic B-splines that leave both ends alone; the links follow a
+course chosen beforehand. The splines' coefficients are the unknowns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Chain
+
+from .slow_flow import Course, follow_course
+
+__all__ = ["LinkCourse", "Standing", "Steering"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Complex coefficients of a drive for every actuator, each of which makes one complex condition.
+PER_ACTUATOR = 13 / 6
+# Intervals under one spline, and the weights of its shifted powers.
+SUPPORT, BINOMIAL = 6, np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
+# Phase of the fastest slow rate in one step: Runge and Kutta then err by 1e-5 of the amplitude on a way.
+STEP = 0.25
+# Weights of movement on the way, seen at about so many instants, against 1 for the steady amplitude, and of a
+# coefficient against the steady drive.
+MOVEMENT, LOOKS, EFFORT = 0.02, 40, 1e-4
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A steady motion of a chain of n.
+
+    Attributes
+    ----------
+    epsilon : complex drive phasor. lam : float64, shape (n-1,), links. phasor : complex128, shape (n,), dimensionless.
+    """
+
+    epsilon: complex
+    lam: Floats
+    phasor: Complexes
+
+
+@dataclass(frozen=True)
+class LinkCourse:
+    """Links that stay at `top` and come to their steady values in the last `share` of the way.
+
+    `top` is None where they may not move: they are the steady ones throughout.
+    """
+
+    top: float | None
+    share: float
+
+    def at(self, x: Floats, steady: Floats) -> tuple[Floats, Floats]:
+        """Links and their derivatives in x at x in [0, 1]; each float64, shape (len(x), n-1)."""
+        if self.top is None:
+            still = np.repeat(steady[None, :], len(x), axis=0)
+            return still, np.zeros_like(still)
+        step, slope = smooth_step((x - 1) / self.share + 1)
+        return self.top + (steady - self.top) * step[:, None], (steady - self.top) * slope[:, None] / self.share
+
+
+def smooth_step(x: Floats) -> tuple[Floats, Floats]:
+    """The C^2 step from 0 at x <= 0 to 1 at x >= 1, and its derivative."""
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * (1 - x) ** 2
+
+
+def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
+    """Quintic B-splines on equal intervals of [0, 1] that vanish with four derivatives at both ends, and derivatives.
+
+    An interval is about two periods of the carrier. Cubic ones would have enough of the frequency 2 omega in them to
+    turn what is felt with the carrier's phase by several thousandths.
+
+    Returns
+    -------
+    float64, shape (len(x), intervals - SUPPORT + 1), each.
+    """
+    away = x[:, None, None] * intervals - np.arange(intervals - SUPPORT + 1)[:, None] - np.arange(SUPPORT + 1)
+    late = np.maximum(away, 0.0)
+    value: Floats = late**5 @ BINOMIAL / 120
+    slope: Floats = intervals / 24 * (late**4 @ BINOMIAL)
+    return value, slope
+
+
+@dataclass(frozen=True)
+class Steering:
+    """The task: `chain` at `omega` from rest to `held` in `duration` (tau) with the links on `links`."""
+
+    chain: Chain
+    omega: float
+    held: Standing
+    links: LinkCourse
+    duration: float
+
+    @property
+    def intervals(self) -> int:
+        """Spline intervals of the drive."""
+        return SUPPORT - 1 + max(6, math.ceil(self.chain.n * PER_ACTUATOR))
+
+    @property
+    def size(self) -> int:
+        """Unknowns: real and imaginary part of every coefficient."""
+        return 2 * (self.intervals - SUPPORT + 1)
+
+    @property
+    def amplitude(self) -> float:
+        """What motions are measured in: the largest steady amplitude."""
+        return float(np.abs(self.held.phasor).max())
+
+    @property
+    def steps(self) -> int:
+        """Integration steps."""
+        top = max(float(self.held.lam.max(initial=0.0)), self.links.top or 0.0)
+        bend = 0.75 * abs(self.chain.beta) * (2 * self.amplitude) ** 2
+        rate = (abs(1 - self.omega**2) + self.chain.delta + top + bend) / (2 * self.omega)
+        return max(4 * self.intervals, math.ceil(self.duration * rate / STEP))
+
+    def drive(self, x: Floats, unknowns: Floats) -> tuple[Complexes, Complexes]:
+        """Drive envelopes of unknowns of shape (P, size) and their derivatives in x; complex128, (len(x), P) each."""
+        half = self.size // 2
+        factors = abs(self.held.epsilon) * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
+        value, slope = splines(x, self.intervals)
+        step, step_slope = smooth_step(x)
+        last = self.held.epsilon
+        return np.asarray(last * step[:, None] + value @ factors), np.asarray(
+            last * step_slope[:, None] + slope @ factors
+        )
+
+    def follow(self, unknowns: Floats, softness: float) -> Complexes:
+        """Amplitudes on the way for unknowns of shape (P, size); complex128, shape (steps + 1, n, P)."""
+        x = np.linspace(0.0, 1.0, 2 * self.steps + 1)
+        epsilon, epsilon_slope = self.drive(x, unknowns)
+        lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.held.lam))
+        course = Course(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration)
+        with np.errstate(all="ignore"):
+            return follow_course(self.chain, self.omega, self.duration, course, self.held.phasor, softness)
+
+    def misses(self, unknowns: Floats, softness: float) -> tuple[Floats, Floats]:
+        """By how much the end is missed, shape (P, 2 n), and movement and effort, shape (P, S)."""
+        trace = self.follow(unknowns, softness) / self.amplitude
+        end = trace[-1] - self.held.phasor[:, None] / self.amplitude
+        moved = trace[:: max(1, len(trace) // LOOKS)].reshape(-1, len(unknowns)) * MOVEMENT
+        cost = np.concatenate([moved.real, moved.imag, EFFORT * unknowns.T])
+        return np.concatenate([end.real, end.imag]).T, cost.T

@@ -1,0 +1,148 @@
+"""What a way does under the full equations, from rest or from a standing motion, and in the time after."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Chain
+
+__all__ = ["Orbit", "Passage", "Way", "travel"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+SAMPLES_PER_PERIOD = 64
+# Periods in which a standing motion is set up; what that leaves of a transient is below 1e-6 of the motion.
+PRELUDE = 24
+
+
+@dataclass(frozen=True)
+class Way:
+    """A ramp in tau: cubic Hermite between the drive's nodes, straight between those of the links, then constant.
+
+    Attributes
+    ----------
+    tau : float64, shape (K,). epsilon, epsilon_slope : complex128, shape (K,), slope in tau.
+    lam_tau : float64, shape (L,). lam : float64, shape (L, n-1).
+    """
+
+    tau: Floats
+    epsilon: Complexes
+    epsilon_slope: Complexes
+    lam_tau: Floats
+    lam: Floats
+
+    def drive(self, tau: Floats) -> tuple[Complexes, Complexes]:
+        """Envelope and its derivative at instants `tau`."""
+        at = np.minimum(tau, self.tau[-1])
+        k = np.clip(np.searchsorted(self.tau, at, side="right") - 1, 0, len(self.tau) - 2)
+        width = np.diff(self.tau)[k]
+        s = (at - self.tau[k]) / width
+        rise = np.diff(self.epsilon)[k]
+        begin, end = width * self.epsilon_slope[k], width * self.epsilon_slope[k + 1]
+        square, cube = 3 * rise - 2 * begin - end, begin + end - 2 * rise
+        value = self.epsilon[k] + s * (begin + s * (square + s * cube))
+        slope = (begin + s * (2 * square + 3 * s * cube)) / width
+        return value, np.where(tau < self.tau[-1], slope, 0.0)
+
+    def links(self, tau: Floats) -> Floats:
+        """Links at instants `tau`: float64, shape (len(tau), n-1)."""
+        out = np.empty((len(tau), self.lam.shape[1]))
+        for m, link in enumerate(self.lam.T):
+            out[:, m] = np.interp(tau, self.lam_tau, link)
+        return out
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic motion ``z = Re(sum_k harmonics[k - 1] e^{i k omega tau})``.
+
+    Attributes
+    ----------
+    harmonics : complex128, shape (H, n). lam : float64, shape (n-1,), the links it stands under.
+    """
+
+    harmonics: Complexes
+    lam: Floats
+
+    def prelude(self, chain: Chain, omega: float, phase: float) -> Floats:
+        """Forces on every actuator that lead from rest onto the orbit, up to one sample before the carrier's `phase`.
+
+        The motion is chosen, the orbit times a smooth step, and the equations say which forces that takes.
+
+        Returns
+        -------
+        float64, shape (samples, n), at `SAMPLES_PER_PERIOD`.
+        """
+        count = PRELUDE * SAMPLES_PER_PERIOD
+        length = 2 * math.pi / omega * PRELUDE
+        x = np.arange(count) / count
+        step, slope, bend = x**3 * (10 - 15 * x + 6 * x**2), 30 * (x * (1 - x)) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
+        rate = 1j * omega * np.arange(1, len(self.harmonics) + 1)
+        turning = np.exp(rate * (x[:, None] - 1) * length + rate / omega * phase)
+        z, v, a = ((turning * rate**k @ self.harmonics).real for k in range(3))
+        moved = step[:, None] * z
+        force = (
+            step[:, None] * a + slope[:, None] * (2 * v + chain.delta * z) / length + bend[:, None] * z / length**2
+            + step[:, None] * chain.delta * v + moved + chain.beta * moved**3
+        )  # fmt: skip
+        force[:, 1:] -= self.lam * (moved[:, :-1] - moved[:, 1:])
+        return np.asarray(force)
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How it went.
+
+    Attributes
+    ----------
+    felt : complex128, shape (periods, n), first harmonics in each whole period after the way.
+    peak : largest |z| of all.
+    """
+
+    felt: Complexes
+    peak: float
+
+
+def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: int, phase: float) -> Passage:
+    """Follow a way from rest or from an orbit, then stand for so many periods.
+
+    Parameters
+    ----------
+    phase : of the carrier when the way begins, radians.
+    """
+    from chainsim import GridIntegrator
+
+    dtau = 2 * math.pi / omega / SAMPLES_PER_PERIOD
+    steps = math.ceil(float(way.tau[-1]) / dtau)
+    tau = dtau * np.arange(steps + periods * SAMPLES_PER_PERIOD, dtype=np.float64)
+    carrier = np.exp(1j * (omega * tau + phase))
+    pass_by, tilt = _hold(omega, dtau)
+    value, slope = way.drive(tau)
+    force = np.zeros((len(tau), 1, chain.n))
+    force[:, 0, 0] = ((value / pass_by + 1j * slope * tilt / pass_by**2) * carrier).real
+    lam = np.zeros_like(force)
+    lam[:, 0, 1:] = way.links(tau)
+    grid = GridIntegrator(
+        shape=(1, chain.n), chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
+    )
+    if start is not None:
+        before = start.prelude(chain, omega, phase) / pass_by
+        grid.advance(before[:, None, :], np.concatenate([[0.0], start.lam])[None, :])
+    z = grid.advance(force, lam)[:, 0]
+    after = (z[steps:] * carrier[steps:, None].conj()).reshape(periods, SAMPLES_PER_PERIOD, chain.n)
+    return Passage(2 * after.mean(axis=1), float(np.abs(z).max()))
+
+
+def _hold(omega: float, dtau: float) -> tuple[float, float]:
+    """What straight lines between samples pass of a carrier, sinc^2 of half a sample's phase, and its derivative.
+
+    Undone by `travel`, or every stage would magnify the little that is lost.
+    """
+    half = omega * dtau / 2
+    sinc = math.sin(half) / half
+    return sinc**2, dtau * sinc * (half * math.cos(half) - math.sin(half)) / half**2
