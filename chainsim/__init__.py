@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     )
     from .sweep_file import SettingSweep, read_sweep
     from .sweeps import SweepResult, sweep, unit_of
-    from .terms import Terms
+    from .terms import Terms, Tone
     from .terms_ode import integrate_terms
     from .terms_tones import two_tones
 
@@ -67,6 +67,7 @@ __all__ = [
     "Stats",
     "SweepResult",
     "Terms",
+    "Tone",
     "balance_near",
     "continue_branch",
     "critical_lam",
@@ -96,6 +97,7 @@ __all__ = [
 ]
 
 _LATE = {
+    "Tone": "terms",
     "follow": "envelope",
     "two_tones": "terms_tones",
     "integrate_terms": "terms_ode",

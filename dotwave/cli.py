@@ -16,6 +16,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from .cli_pictures import picture_app
+from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
 from .command import Device, Json, Written, printable
@@ -206,6 +207,7 @@ def doctor(as_json: Json = False) -> None:
 
 app.add_typer(picture_app)
 app.add_typer(study_app)
+app.add_typer(plan_app)
 app.add_typer(play_app)
 
 

@@ -12,6 +12,7 @@ from chainsim import Closure, Device, Outcome
 from .fit import Fitted
 from .links import detuning_gain
 from .margins import converter_error, lacking_of, slew_of, well_of
+from .nearest import nearest_geometric
 from .plan import ChainState, Margins
 from .wave_fit import GOOD, WaveFit
 from .wish import ChainWish
@@ -23,6 +24,8 @@ Floats = NDArray[np.float64]
 # Rounding lam by half a step turns each lag by about half the step over lam; errors up to so many times what that
 # makes along the chain are laid to it.
 ROUNDING = 2.0
+# Amplitudes this far (of full scale) from every geometric row are out of reach by their shape, whatever else is.
+UNEVEN = 0.1
 
 
 def wave_state(device: Device, wish: ChainWish) -> ChainState:
@@ -89,6 +92,8 @@ class _Told:
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
             return "" if small else f"the converter's steps leave {100 * noise / scale:.1g} % error; it lacks bits"
+        if self._uneven():
+            return self._no_freedom()
         if self.share < 1.0:
             part = f"{100 * self.share:.0f} % of this amplitude"
             return f"no more than {part} was found to stand on one branch; it lacks linearity (a smaller beta)"
@@ -97,6 +102,14 @@ class _Told:
         if found.outcome is not Outcome.OK:
             return "nothing near it is stable; it lacks damping, or linearity (a smaller beta)"
         return self._out_of_range() or self._no_freedom()
+
+    def _uneven(self) -> bool:
+        """Whether neighbours are to differ as one lam and one drive never let them."""
+        device, target = self.task.device, self.task.wish.amplitude
+        if device.coupling.scope == "link":
+            return False
+        near = nearest_geometric(device, target, 1.0)
+        return bool(np.abs(near.first * near.ratio ** np.arange(len(target)) - target).max() > UNEVEN)
 
     def _out_of_range(self) -> str:
         hold, lam, omega = self.found.hold, self.task.device.coupling.lam, self.task.device.omega

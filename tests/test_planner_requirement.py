@@ -1,0 +1,315 @@
+"""What a scene requires: every estimate against the solved term, and what the selection leaves out and saves."""
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from chainsim import Chain, Closure, Device, Outcome, Setting, load_device, solve
+from chainsim.terms import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
+from chainsim.terms_ode import integrate_terms
+from encoders import Frame, GridShape, TargetPattern, TextOptions, TextSource, encode_text
+from planner import ChainState, FramePlan, Margins, Spread, Tone, plan_scene, spread_of
+from planner.effects import StandingChain
+from planner.requirement import Requirement, RequirementError, require
+from planner.scene_effects import TERMS
+from planner.surroundings import HigherMode, Surroundings, assumed
+
+LINKED = load_device("linked-6x6")
+NOTHING = Surroundings()
+
+
+def device_of(n, *, rows=1, delta=0.03, beta=-1.0, **changes):
+    profile = LINKED.as_dict() | {"rows": rows, "cols": n, "chain_length": n, "delta": delta, "beta": beta} | changes
+    return Device.model_validate(profile)
+
+
+def held(device, setting, *, phase=None):
+    """The state a chain reaches from rest, or None."""
+    response = solve(device.chain, setting, tol=1e-9, rung="auto", start="rest")
+    if response.outcome[0] is not Outcome.OK:
+        return None
+    drive = complex(setting.epsilon[0] * np.exp(1j * setting.phase[0]))
+    felt = response.phasor[0] if drive else np.zeros(device.chain_length, complex)
+    return ChainState(
+        np.abs(felt + response.mean[0]) / device.full_scale, drive, setting.lam[0, 1:], setting.bias[0],
+        float(setting.omega[0]), felt, response.mean[0], 0.0, Margins(0.0, 0.0), Outcome.OK, phase,
+    )  # fmt: skip
+
+
+def frame_of(device, states, *, held_s=1.0, ramps=None, start_s=0.0):
+    pattern = TargetPattern(np.zeros((device.rows, device.cols), complex))
+    ramps = ramps or (None,) * len(states)
+    return FramePlan(Frame(pattern, held_s), start_s, start_s, start_s + held_s, tuple(states), ramps)
+
+
+def effects(device, states, around=NOTHING, *, tol=1e-3, **frame):
+    found = require([frame_of(device, states, **frame)], device, around, tol=tol)
+    return {term.name: term.effect for term in found.terms}
+
+
+def terms_of(around, names, device):
+    """The simulator's terms for those names."""
+    loop = around.hysteresis / around.saturation if around.saturation < math.inf else 0.0
+    first = around.creep_first_s * device.tau_per_s
+    return Terms(
+        hysteresis=BoucWen(around.hysteresis, 0.75 * loop, 0.25 * loop) if "hysteresis" in names else None,
+        creep=Creep(around.creep_per_decade, first, 1e3 * first) if "creep" in names else None,
+        modes=tuple(Mode(one.omega, one.delta, one.gain) for one in around.modes) if "higher modes" in names else None,
+        amplifier=AmplifierDynamics(around.bandwidth_hz / device.f0_hz) if "amplifier dynamics" in names else None,
+    )  # fmt: skip
+
+
+def integrated(device, state, around, names, *, factors=None, duration):
+    """Amplitudes or deflections from rest with the terms of those names, and the work; `factors` of each stiffness."""
+    stiffness = 1.0 if factors is None or "spread" not in names else factors
+    beta = device.beta if "nonlinearity" in names else 0.0
+    chain = Chain.of(device.chain_length, delta=device.delta, beta=beta, stiffness=stiffness)
+    setting = setting_of(device, state, around if "preload" in names else NOTHING)
+    step = min(0.1, 0.9 * device.f0_hz / around.bandwidth_hz) if "amplifier dynamics" in names else 0.1
+    terms = terms_of(around, names, device)
+    motion = integrate_terms(chain, setting, terms, duration=duration, step=step, every=round(0.6 / step))
+    if motion.outcome is not Outcome.OK:
+        return np.full(chain.n, np.inf), motion.stats.rhs_evals
+    if not state.moving:
+        return np.abs(motion.tip[-1]), motion.stats.rhs_evals
+    late = duration - 40 * math.pi / state.omega
+    return np.abs(motion.line(state.omega, since=late)), motion.stats.rhs_evals
+
+
+def setting_of(device, state, around):
+    lam = state.lam[0] if device.coupling.closure is Closure.RING else state.lam
+    return Setting.of(
+        device.chain, epsilon=abs(state.epsilon), phase=float(np.angle(state.epsilon)), lam=lam, omega=state.omega,
+        bias=state.bias, preload=around.preload,
+    )  # fmt: skip
+
+
+def random_scene(rng):
+    """A device, one chain's state, what acts beside, and a tolerance; every size log-uniform."""
+    while True:
+        n = int(rng.integers(1, 4))
+        device = device_of(n, delta=float(rng.uniform(0.03, 0.08)), beta=float(rng.choice([-1.0, 0.5])))
+        lam, omega = rng.uniform(0.0, 0.3, n - 1), float(rng.uniform(0.9, 1.3))
+        if n == 1:
+            lam = 0.0
+        amplitude = 10 ** rng.uniform(-2.5, -1)
+        if rng.random() < 0.3:
+            bias = amplitude * rng.choice([0.0, 0.5, 1.0], n)
+            bias[0] = amplitude
+            setting = Setting.of(device.chain, epsilon=0.0, lam=lam, omega=1.0, bias=bias)
+        else:
+            epsilon = amplitude * abs(1 - omega**2 + 1j * device.delta * omega)
+            setting = Setting.of(device.chain, epsilon=epsilon, lam=lam, omega=omega)
+        state = held(device, setting)
+        if state is not None and np.abs(state.phasor + state.mean).max() < 0.3:
+            return device, state, random_surroundings(rng, device, float(np.abs(setting.epsilon + amplitude)[0])), rng
+
+
+def random_surroundings(rng, device, force):
+    def size(low, high):
+        return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+    return Surroundings(
+        preload=size(1e-5, 1e-1), hysteresis=size(1e-6, 1e-1), saturation=force * size(1e-2, 10),
+        creep_per_decade=size(1e-6, 1e-1), creep_first_s=size(10, 100) / device.tau_per_s,
+        modes=(HigherMode(4.965, 5 * device.delta, size(1e-6, 3)),), bandwidth_hz=device.f0_hz * size(1, 50),
+        spread=Spread(f0=size(1e-6, 1e-2)),
+    )  # fmt: skip
+
+
+def left_out_matters(seed):
+    """By how much, in units of the tolerance, and the evaluations with everything and with the selection."""
+    rng = np.random.default_rng(seed)
+    device, state, around, rng = random_scene(rng)
+    tol = float(10 ** rng.uniform(-3.5, -1))
+    duration = 2 * (12 + 3 * device.chain_length) / device.delta
+    frame = frame_of(device, [state], held_s=duration / device.tau_per_s)
+    found = require([frame], device, around, tol=tol)
+    factors = (1 + around.spread.f0 * rng.standard_normal(device.chain_length)) ** 2
+    full, work = integrated(device, state, around, frozenset(TERMS), factors=factors, duration=duration)
+    if found.included & {"hysteresis", "creep", "higher modes", "amplifier dynamics"}:
+        kept, less = integrated(device, state, around, found.included, factors=factors, duration=duration)
+    else:
+        scattered = factors if "spread" in found.included else 1.0
+        chain = Chain.of(device.chain_length, delta=device.delta, beta=device.beta, stiffness=scattered)
+        setting = setting_of(device, state, around if "preload" in found.included else NOTHING)
+        answer = solve(chain, setting, tol=tol / 10, rung=found.rung, start="rest")
+        kept = np.abs(answer.phasor[0] if state.moving else answer.mean[0])
+        less = answer.stats.newton_steps + answer.stats.oscillators_solved
+    scale = np.abs(state.phasor + state.mean).max()
+    return float(np.abs(full - kept).max()) / scale / tol, work, less
+
+
+def check_scenes(count):
+    found = np.array([left_out_matters(seed) for seed in range(count)])
+    assert np.mean(found[:, 0] <= 1) >= 0.99, np.flatnonzero(found[:, 0] > 1)
+    # Something was left out that can be seen, and it saved work.
+    assert np.median(found[:, 0]) > 1e-3
+    assert found[:, 2].sum() < 0.8 * found[:, 1].sum()
+
+
+def test_what_is_left_out_of_random_scenes_matters_less_than_the_tolerance():
+    check_scenes(20)
+
+
+@pytest.mark.slow
+def test_what_is_left_out_of_200_random_scenes_matters_less_than_the_tolerance():
+    check_scenes(200)
+
+
+def vibrating(n=3, *, omega=1.2, lam=0.1, amplitude=0.08, device=None, phase=None):
+    device = device or device_of(n)
+    epsilon = amplitude * abs(1 - omega**2 + 1j * device.delta * omega)
+    return device, held(device, Setting.of(device.chain, epsilon=epsilon, lam=lam, omega=omega), phase=phase)
+
+
+def resting(bias):
+    device = device_of(len(bias))
+    return device, held(device, Setting.of(device.chain, epsilon=0.0, lam=0.1, omega=1.0, bias=bias))
+
+
+def test_nonlinearity_is_what_the_linear_rung_is_off_by():
+    device, state = vibrating()
+    answer = solve(device.chain, setting_of(device, state, NOTHING), tol=1e-6, rung="linear", start="rest")
+    off = np.abs(np.abs(answer.phasor[0]) - np.abs(state.phasor)).max() / np.abs(state.phasor).max()
+    assert effects(device, [state])["nonlinearity"] == pytest.approx(off, rel=1e-9)
+    phased = replace(state, phase=np.angle(state.phasor))
+    turned = answer.phasor[0] * np.exp(-1j * np.angle(np.vdot(state.phasor, answer.phasor[0])))
+    off = np.abs(turned - state.phasor).max() / np.abs(state.phasor).max()
+    assert effects(device, [phased])["nonlinearity"] == pytest.approx(off, rel=1e-9)
+
+
+@pytest.mark.parametrize("closure", ["open", "ring"])
+def test_third_harmonic_is_what_one_harmonic_is_off_by(closure):
+    coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
+    device = device_of(3, coupling=coupling)
+    device, state = vibrating(device=device, lam=0.02, omega=0.97)
+    moved = StandingChain.of(device, state).without_third()[0]
+    setting = setting_of(device, state, NOTHING)
+    if closure == "open":
+        one = solve(device.chain, setting, tol=1e-3, rung="one_harmonic", start="rest").phasor[0]
+        exact = solve(device.chain, setting, tol=1e-12, rung="harmonic_balance", start="rest").phasor[0]
+        assert np.abs(moved - (one - exact)).max() < 0.1 * np.abs(one - exact).max()
+    assert 0 < np.abs(moved).max() < 1e-4 * np.abs(state.phasor).max()
+
+
+@pytest.mark.parametrize("closure", ["open", "ring"])
+def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
+    coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
+    device, state = vibrating(device=device_of(3, coupling=coupling), lam=0.02, omega=0.95)
+    standing = StandingChain.of(device, state)
+    setting = setting_of(device, state, NOTHING)
+    more = Setting.of(device.chain, epsilon=1.001 * setting.epsilon, lam=state.lam[0], omega=setting.omega)
+    before, after = (solve(device.chain, one, tol=1e-11, start="rest").phasor[0] for one in (setting, more))
+    force = np.zeros(3, complex)
+    force[0] = 1e-3 * state.epsilon
+    assert standing.moved(standing.lines[0], force) == pytest.approx(after - before, rel=5e-3, abs=1e-9)
+
+
+def test_spread_is_what_draws_scatter_by():
+    device, state = vibrating(amplitude=0.05, device=device_of(4, rows=1))
+    for spread in (Spread(f0=1e-4), Spread(delta=1e-3), Spread(beta=1e-3), Spread(lam=1e-4)):
+        sigma = effects(device, [state], Surroundings(spread=spread))["spread"] / 2
+        report = spread_of(device, [state], spread, tolerance=1.0, threshold=0.5, count=4000)
+        worst = report.error * device.full_scale / np.abs(state.phasor).max()
+        # The worst of four actuators, of which one scatters most.
+        assert 0.7 * sigma < worst.mean() < 1.7 * sigma
+
+
+def test_coupled_rows_are_what_a_grid_does():
+    device = device_of(3, rows=2)
+    biases = np.array([[0.02, 0.05, 0.0], [0.04, 0.0, 0.03]])
+    lam = np.array([[0.1, 0.1]] * 2)
+    states = []
+    for bias in biases:
+        setting = Setting.of(device.chain, epsilon=0.0, lam=0.1, omega=1.0, bias=bias)
+        states.append(held(device, setting))
+    grid = Chain(6, device.delta, device.beta, Closure.OPEN, rows=2)
+    setting = Setting.of(grid, epsilon=0.0, lam=lam, lam_y=1e-3, omega=1.0, bias=biases.ravel())
+    whole = solve(grid, setting, tol=1e-10, rung="static", start="rest").mean[0].reshape(2, 3)
+    alone = np.array([state.mean for state in states])
+    off = np.abs(whole - alone).max() / alone.max()
+    assert effects(device, states, Surroundings(row_lam=1e-3))["2-D coupling"] / 2 == pytest.approx(off, rel=0.02)
+
+
+def test_the_way_in_counts_for_half_of_its_time():
+    device = load_device("paper-6x6")
+    scene = encode_text(TextSource.of_text("a"), GridShape(6, 6), TextOptions(dwell_s=1.0))
+    frame = next(iter(plan_scene(scene, device).frames))
+    at, ramp = next((i, ramp) for i, ramp in enumerate(frame.ramps) if ramp is not None)
+    lacking = 1 - ramp.bias[:, :] @ frame.states[at].bias / (frame.states[at].bias @ frame.states[at].bias)
+    mean = np.trapezoid(lacking, ramp.t_s) / (frame.end_s - frame.start_s)
+    found = require([frame], device, NOTHING, tol=1e-3)
+    assert found["transients"].effect / 2 == pytest.approx(mean, rel=0.02)
+    assert found["transients"].cost == 0
+    assert found.rung == "static"
+
+
+def test_tones_and_what_they_add_up_to():
+    device, first = vibrating(amplitude=0.03, lam=0.05, omega=0.95)
+    _, second = vibrating(amplitude=0.03, lam=0.05, omega=1.12)
+    both = replace(first, tones=(Tone(second.omega, second.epsilon, second.phasor),))
+    standing = StandingChain.of(device, both)
+    assert standing.size == pytest.approx(np.abs(first.phasor) + np.abs(second.phasor))
+    for change, state in zip(standing.without_cubic(), (first, second), strict=True):
+        linear = solve(device.chain, setting_of(device, state, NOTHING), tol=1e-6, rung="linear", start="rest")
+        assert change == pytest.approx(linear.phasor[0] - state.phasor, abs=1e-12)
+    assert effects(device, [both])["third harmonic"] > effects(device, [first])["third harmonic"]
+
+
+def test_an_amplifier_only_turns_what_all_actuators_share():
+    device, state = vibrating(amplitude=1e-3)
+    around = Surroundings(bandwidth_hz=20 * device.f0_hz)
+    loss = 1 - 1 / math.sqrt(1 + (state.omega / 20) ** 2)
+    assert effects(device, [state], around)["amplifier dynamics"] / 2 == pytest.approx(loss, rel=0.02)
+    phased = replace(state, phase=np.angle(state.phasor))
+    assert effects(device, [phased], around)["amplifier dynamics"] / 2 == pytest.approx(loss, rel=0.02)
+
+
+def test_nothing_around_and_nothing_shown_require_nothing():
+    device, state = resting([0.0, 0.0, 0.0])
+    found = require([frame_of(device, [state])], device, assumed(device), tol=1e-9)
+    assert found.included == frozenset()
+    assert found.left_out == 0.0
+
+
+def test_what_is_assumed_is_the_papers_beam():
+    modes = bending_modes(133.13, (661.03, 1258.3), delta=LINKED.delta)
+    for ours, theirs in zip(assumed(LINKED).modes, modes, strict=True):
+        assert (ours.omega, ours.delta) == (theirs.omega, theirs.delta)
+        assert ours.gain == pytest.approx(theirs.gain, rel=1e-4)
+
+
+def test_the_selection_is_monotone_in_the_tolerance():
+    device, state = vibrating()
+    frame = frame_of(device, [state])
+    found = [require([frame], device, assumed(device), tol=tol) for tol in (1e-6, 1e-4, 1e-2, 1.0, 1e3)]
+    for strict, loose in pairwise(found):
+        assert loose.included <= strict.included
+        assert loose.work <= strict.work <= strict.work_of_all
+    assert all(one.left_out <= one.tol for one in found)
+    assert [one.rung for one in found][-1] == "linear"
+    assert found[0].rung == "harmonic_balance"
+
+
+def test_the_table_names_every_term_and_is_plain_json():
+    device, state = vibrating()
+    found = require([frame_of(device, [state])], device, assumed(device), tol=1e-2)
+    assert isinstance(found, Requirement)
+    text = found.as_text()
+    assert all(f"{name} " in text for name in TERMS)
+    assert json.loads(json.dumps(found.as_dict()))["rung"] == found.rung
+
+
+def test_complaints():
+    device, state = vibrating()
+    with pytest.raises(RequirementError, match="tol: expected a number > 0, got 0"):
+        require([frame_of(device, [state])], device, NOTHING, tol=0.0)
+    with pytest.raises(RequirementError, match="at least one frame"):
+        require([], device, NOTHING, tol=0.1)
+    with pytest.raises(KeyError, match="friction"):
+        require([frame_of(device, [state])], device, NOTHING, tol=0.1)["friction"]
