@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -13,6 +14,7 @@ __all__ = ["LinkLost", "PortUnavailable", "SerialMissing", "SerialPort", "Uart",
 
 BAUD = 2_000_000
 WRITE_TIMEOUT_S = 1.0
+PARTING_S = 0.5
 
 
 class SerialMissing(DriverError, ImportError):
@@ -106,10 +108,15 @@ class Uart:
             raise LinkLost(f"{self.name}: {_reason(error)}") from None
 
     def close(self) -> None:
-        """Give the port back; never fails."""
+        """Give the port back, after the last bytes have left or `PARTING_S` have passed; never fails."""
         with suppress(*self._errors):
-            # What is still in the system's buffer is of no use to a closed port, and waiting for it may block.
-            self._port.reset_output_buffer()
+            # The last bytes are the ones that bring the output to zero. A line that takes nothing loses them: then
+            # they are thrown away, because closing would wait for them.
+            until = time.monotonic() + PARTING_S
+            while self._port.out_waiting and time.monotonic() < until:
+                time.sleep(0.005)
+            if self._port.out_waiting:
+                self._port.reset_output_buffer()
         with suppress(*self._errors):
             self._port.close()
 
