@@ -119,7 +119,7 @@ class FrameCheck:
     page : page of the frame. outcome : what the planner said of it.
     target, felt : float64, shape (rows, cols), amplitude in units of full scale.
     wrong_dots : actuators felt on the wrong side of the threshold.
-    contrast_db : weakest wanted dot over the strongest unwanted one; None when the frame lacks either.
+    contrast_db : weakest wanted dot over the strongest unwanted one; None when the frame lacks either, or has levels.
     amplitude_error : worst deviation from `target`, in units of full scale; of the complex amplitude where phases
         are wanted, and of the worst tone where there are several.
     wanted_cells, felt_cells : Unicode Braille, lines separated by a newline. text : the source's span.

@@ -26,6 +26,8 @@ Complexes = NDArray[np.complex128]
 
 # Forces, links and positions of a block stay near 8 MB each, whatever the grid.
 BLOCK_VALUES = 1 << 20
+# A target between these is a level, neither a raised dot nor a flat one.
+GRADED = (0.3, 0.9)
 
 
 class Felt(NamedTuple):
@@ -190,6 +192,8 @@ def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
     wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
     # A level wanted at the threshold itself may be felt on either side of it.
     near = np.abs(felt.level - mark.target) <= AMPLITUDE_ERROR_LIMIT
+    # Between levels there is no such thing as the contrast of dots; the amplitudes are held to all the same.
+    graded = bool(np.any((mark.target > GRADED[0]) & (mark.target < GRADED[1])))
     return FrameCheck(
         page=mark.page,
         start_s=mark.start_s,
@@ -199,7 +203,7 @@ def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
         target=mark.target,
         felt=felt.level,
         wrong_dots=int(np.count_nonzero(((wanted != present) & ~near) | np.isnan(felt.level))),
-        contrast_db=contrast_between(wanted, felt.level),
+        contrast_db=None if graded else contrast_between(wanted, felt.level),
         amplitude_error=float(np.max(felt.error)),
         wanted_cells=mark.cells,
         text=mark.text,
