@@ -43,7 +43,8 @@ class PictureLimits:
 
     Attributes
     ----------
-    file_bytes : size of the file. pixels : width times height of a frame.
+    file_bytes : size of the file. pixels : width times height of a JPEG; three tenths of it for
+        other kinds, an animation's frames together.
     frames : frames of an animation. svg_bytes : size of an SVG when unpacked.
     svg_elements : elements an SVG draws, those by reference counted each time.
     """
@@ -180,10 +181,10 @@ def _from_image(image: Image, name: str, longest_px: int, limits: PictureLimits)
     from PIL import Image
 
     kind, size = image.format or "image", (image.height, image.width)
-    if size[0] * size[1] > limits.pixels or not all(size):
-        raise PictureTooLarge(
-            f"{name}: {size[1]} x {size[0]} pixels; from 1 to {limits.pixels} are read, scale the picture"
-        )
+    # Photographs are JPEG. Elsewhere so many pixels are a mistake or a bomb, and take four times the memory.
+    most = limits.pixels if kind in {"JPEG", "MPO"} else limits.pixels * 3 // 10
+    if size[0] * size[1] > most or not all(size):
+        raise PictureTooLarge(f"{name}: {size[1]} x {size[0]} pixels; from 1 to {most} are read, scale the picture")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -213,9 +214,14 @@ def _frames(image: Image, longest_px: int, limits: PictureLimits, notes: dict[st
         )
     if not animated and getattr(image, "n_frames", 1) > 1:
         notes["only the first page of several is shown"] = None
+    total = 0
     for index in range(count):
         if animated:
             image.seek(index)
+            # A frame may reach beyond the size that the file begins with, and is then as large as it says.
+            total += image.width * image.height
+            if total > limits.pixels * 3 // 10:
+                raise PictureTooLarge(f"its {count} frames have too many pixels; cut or scale the animation")
         seconds = float(image.info.get("duration") or 0) / 1000 if animated else 0.0
         yield Raster(_frozen(_reduced(_upright_srgb(image, notes), longest_px)), seconds)
 
