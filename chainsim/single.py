@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .scaling import Stages
+from .starts import newton_of_one
 
 __all__ = ["march_alone"]
 
@@ -75,13 +76,4 @@ def _lowest_root(kappa: float, g: float, sign: float, c: float) -> float:
     v = 0.0
     if not (bend > 0 and c <= at_turn):
         v = abs(kappa) + cube if bend > 0 else min(cube, c / linear if linear > 0 else math.inf)
-    for _ in range(80):
-        stiff = kappa + sign * v
-        slope = stiff * (stiff + 2 * sign * v) + gg
-        if slope == 0 or not math.isfinite(slope):
-            break
-        step = (v * (stiff * stiff + gg) - c) / slope
-        v -= step
-        if abs(step) <= 1e-9 * abs(v):
-            break
-    return v
+    return newton_of_one(kappa, gg, c, sign, v)

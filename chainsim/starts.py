@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Cubic", "mean_of", "mean_starts"]
+__all__ = ["Cubic", "mean_of", "mean_starts", "newton_of_one"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -120,16 +120,21 @@ class Cubic:
     def _newton_of_one(self, v: float) -> float:
         """The same for one setting alone, where a NumPy call costs more than the arithmetic."""
         kappa, gg, c, sign = float(self.kappa[0]), float(self.g[0]) ** 2, float(self.c[0]), float(self.sign[0])
-        for _ in range(MAX_STEPS):
-            stiff = kappa + sign * v
-            slope = stiff * (stiff + 2 * sign * v) + gg
-            if slope == 0 or not math.isfinite(slope):
-                break
-            step = (v * (stiff * stiff + gg) - c) / slope
-            v -= step
-            if abs(step) <= 1e-9 * abs(v):
-                break
-        return v
+        return newton_of_one(kappa, gg, c, sign, v)
+
+
+def newton_of_one(kappa: float, gg: float, c: float, sign: float, v: float) -> float:
+    """A root of ``v ((kappa + sign v)^2 + gg) = c`` from the start `v`, in plain numbers."""
+    for _ in range(MAX_STEPS):
+        stiff = kappa + sign * v
+        slope = stiff * (stiff + 2 * sign * v) + gg
+        if slope == 0 or not math.isfinite(slope):
+            break
+        step = (v * (stiff * stiff + gg) - c) / slope
+        v -= step
+        if abs(step) <= 1e-9 * abs(v):
+            break
+    return v
 
 
 def mean_starts(

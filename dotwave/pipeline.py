@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
 from chainsim import Device, Outcome, load_device
 from drivers import EXCHANGE_SUFFIXES, Encoding, WrittenWaveform, write_exchange, write_waveform
 from encoders import EncodingReport, GridShape, TextFrames, TextOptions, TextScene, encode_text
@@ -17,6 +15,7 @@ from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 from .progress import progress
 from .report import TextReport
 from .source import text_source
+from .tally import PlanStopped, Tally, nearest_lines, peak_volts
 
 __all__ = ["render_text"]
 
@@ -68,16 +67,12 @@ def render_text(
                     write_exchange(plan, out, actuator=actuator)
                 else:
                     written = write_waveform(plan, out, encoding=encoding, progress=update)
-        except _CannotBeMade:
+        except PlanStopped:
             pass
     report = _report(profile, scene, watch, written)
     if out is not None and written is None and report.ok:
         report = replace(report, files=(str(out),))
     return replace(report, seconds=time.perf_counter() - began)
-
-
-class _CannotBeMade(Exception):
-    """A frame's outcome is not ok, so there is nothing to write."""
 
 
 @dataclass
@@ -87,28 +82,18 @@ class _Watch:
     plan: Plan
     stop_at_failure: bool
     outcomes: dict[str, int] = field(default_factory=dict)
-    duration_s: float = 0.0
-    ramp_s: float = 0.0
-    error: float = 0.0
-    volts: float = 0.0
-    well: float = 0.0
-    noise_gain: float = 1.0
+    tally: Tally = field(default_factory=Tally)
     failed: FramePlan | None = None
     failed_number: int = 0
 
     def __iter__(self) -> Iterator[FramePlan]:
         for number, frame in enumerate(self.plan.frames, 1):
             self.outcomes[frame.outcome] = self.outcomes.get(frame.outcome, 0) + (frame.frame is not None)
-            self.duration_s = frame.end_s
-            self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
-            self.error = max(self.error, *(state.error for state in frame.states))
-            self.volts = max(self.volts, *(state.margins.volts for state in frame.states))
-            self.well = max(self.well, *(state.margins.well for state in frame.states))
-            self.noise_gain = max(self.noise_gain, *(state.margins.noise_gain for state in frame.states))
+            self.tally.add(frame)
             if frame.outcome is not Outcome.OK and self.failed is None:
                 self.failed, self.failed_number = frame, number
                 if self.stop_at_failure:
-                    raise _CannotBeMade
+                    raise PlanStopped
             yield frame
 
 
@@ -116,21 +101,20 @@ def _report(device: Device, scene: TextScene, watch: _Watch, written: WrittenWav
     frames = scene.text_frames
     encoded = frames.report
     differences, sentence = _back_check(frames)
-    peak = float(np.max(np.abs(written.peak_volts))) if written else watch.volts * device.amplifier.volts
     return TextReport(
         device=device.name,
         tables=tuple(scene.encoding["tables"]),
         text=frames.source.text[:200],
         frames=encoded.frames,
         pages=encoded.pages,
-        duration_s=watch.duration_s,
+        duration_s=watch.tally.duration_s,
         files=(str(written.samples_path), str(written.manifest_path)) if written else (),
-        peak_volts=peak,
+        peak_volts=peak_volts(written, watch.tally, device),
         limit_volts=device.amplifier.volts,
-        ramp_s=watch.ramp_s,
-        error=watch.error,
-        well=watch.well,
-        noise_gain=watch.noise_gain,
+        ramp_s=watch.tally.ramp_s,
+        error=watch.tally.error,
+        well=watch.tally.well,
+        noise_gain=watch.tally.noise_gain,
         outcomes=watch.outcomes,
         undefined=_undefined(encoded),
         split=tuple(
@@ -165,9 +149,6 @@ def _notes(device: Device, encoded: EncodingReport, watch: _Watch) -> Iterator[s
     if watch.failed is None:
         return
     yield f"Frame {watch.failed_number}: {watch.failed.note}"
-    yield "The nearest pattern it can make, in percent of full scale, row by row:"
-    levels = np.array([np.abs(state.phasor + state.mean) for state in watch.failed.states]) / device.full_scale
-    for row in levels.reshape(device.rows, device.cols):
-        yield "  " + " ".join(f"{100 * level:3.0f}" for level in row)
+    yield from nearest_lines(watch.failed, device)
     if watch.stop_at_failure:
         yield "Nothing was written."

@@ -31,6 +31,7 @@ from .errors import AppError
 from .job import TOLERANCES, Item, Job, PicturePart, TextPart, read_job
 from .progress import progress
 from .scene_report import SceneReport
+from .tally import PlanStopped, Tally, nearest_lines, peak_volts
 
 __all__ = ["Rendering", "Shown", "joined", "picture_words", "render_job", "render_scene"]
 
@@ -182,28 +183,23 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
             else:
                 plan = replace(watch.plan, frames=watch)
                 written = write_waveform(plan, how.out, encoding=how.encoding, progress=update)
-        except _Stop:
+        except PlanStopped:
             pass
-    peak = float(np.max(np.abs(written.peak_volts))) if written else watch.volts * device.amplifier.volts
     return SceneReport(
         device=device.name,
         parts=tuple(parts),
         frames=sum(watch.outcomes.values()),
-        duration_s=watch.duration_s,
+        duration_s=watch.tally.duration_s,
         files=(str(written.samples_path), str(written.manifest_path)) if written else (),
-        peak_volts=peak,
+        peak_volts=peak_volts(written, watch.tally, device),
         limit_volts=device.amplifier.volts,
-        ramp_s=watch.ramp_s,
-        error=watch.error,
+        ramp_s=watch.tally.ramp_s,
+        error=watch.tally.error,
         tolerance=how.tolerance,
         outcomes=watch.outcomes,
         notes=tuple(watch.notes),
         seconds=time.perf_counter() - began,
     )
-
-
-class _Stop(Exception):
-    """There is nothing to write, or no time left."""
 
 
 @dataclass
@@ -214,10 +210,7 @@ class _Watch:
     how: Rendering
     outcomes: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    duration_s: float = 0.0
-    ramp_s: float = 0.0
-    error: float = 0.0
-    volts: float = 0.0
+    tally: Tally = field(default_factory=Tally)
 
     def __iter__(self) -> Iterator[FramePlan]:
         began = time.monotonic()
@@ -232,24 +225,15 @@ class _Watch:
                 note = f"off by {100 * error:.3g} % of full scale, {100 * self.how.tolerance:g} % are allowed."
             if frame.frame is not None or outcome is not Outcome.OK:
                 self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
-            self.duration_s, self.error = frame.end_s, max(self.error, error)
-            self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
-            self.volts = max(self.volts, *(state.margins.volts for state in frame.states))
+            self.tally.add(frame)
             if outcome is not Outcome.OK:
                 self._failed(number, frame, note, outcome)
             yield frame
 
     def _failed(self, number: int, frame: FramePlan, note: str, outcome: Outcome) -> None:
         if not self.notes:
-            self.notes += [f"Frame {number}: {note}", *_nearest(frame, self.plan.device)]
+            self.notes += [f"Frame {number}: {note}", *nearest_lines(frame, self.plan.device)]
             if self.how.out is not None:
                 self.notes.append("Nothing was written.")
         if self.how.out is not None or outcome is Outcome.OUT_OF_BUDGET:
-            raise _Stop
-
-
-def _nearest(frame: FramePlan, device: Device) -> Iterator[str]:
-    yield "The nearest pattern it can make, in percent of full scale, row by row:"
-    levels = np.array([np.abs(state.phasor + state.mean) for state in frame.states]) / device.full_scale
-    for row in levels.reshape(device.rows, device.cols):
-        yield "  " + " ".join(f"{100 * level:3.0f}" for level in row)
+            raise PlanStopped
