@@ -8,6 +8,7 @@ from typing import Any
 __all__ = ["draw"]
 
 WIDE, ROW, LEFT = 720, 22, 190
+COLOURS = ("#266694", "#c2571a")
 
 
 def draw(found: dict[str, Any]) -> str:
@@ -47,17 +48,31 @@ def _bars(title: str, key: str, peers: dict[str, Any], top: int) -> tuple[list[s
 
 
 def _lengths(found: dict[str, Any], top: int) -> tuple[list[str], int]:
-    lines = [_text(10, top, f"One chain of n oscillators: slope {found['slope']:.2f} in the logarithms", "bold")]
-    tall, wide = 160, 420
-    sizes, seconds = [math.log10(n) for n in found["n"]], [math.log10(s) for s in found["wall_s"]]
-    low, high = min(seconds), max(seconds)
-    places = [
-        (LEFT + wide * (x - sizes[0]) / (sizes[-1] - sizes[0]), top + 20 + tall * (high - y) / max(high - low, 1e-9))
-        for x, y in zip(sizes, seconds, strict=True)
-    ]
-    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-    lines.append(f'<polyline points="{path}" fill="none" stroke="#266694"/>')
-    for (x, y), n, s in zip(places, found["n"], found["wall_s"], strict=True):
-        lines.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="#266694"/>')
-        lines.append(_text(x - 80, y + 4, f"{n:,}: {s:.3g} s"))
-    return lines, top + 40 + tall
+    """Seconds on the left and megabytes on the right, chain and grid in each, in the logarithms."""
+    lines = [_text(10, top, "One chain, one square grid of n oscillators (processor seconds; megabytes)", "bold")]
+    for left, key, scale, slope, unit in (
+        (60, "cpu_s", 1.0, "slope", "s"),
+        (420, "bytes", 1e-6, "memory_slope", "MB"),
+    ):
+        every = [math.log10(scale * value) for each in found.values() for value in each[key]]
+        for number, (name, each) in enumerate(found.items()):
+            colour = COLOURS[number]
+            values = [scale * value for value in each[key]]
+            places = [
+                (
+                    left + _along(math.log10(n), 3, 6, 210),
+                    top + 185 - _along(math.log10(v), min(every), max(every), 130),
+                )
+                for n, v in zip(each["n"], values, strict=True)
+            ]
+            path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+            lines.append(f'<polyline points="{path}" fill="none" stroke="{colour}"/>')
+            lines += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in places]
+            said = f"{name}: n^{each[slope]:.2f}, {values[-1]:.3g} {unit} at {each['n'][-1]:,}"
+            lines.append(_text(left, top + 22 + 16 * number, f'<tspan fill="{colour}">{said}</tspan>'))
+        lines += [_text(left + 70 * k - 8, top + 205, f"10^{k + 3}") for k in range(4)]
+    return lines, top + 215
+
+
+def _along(value: float, low: float, high: float, length: float) -> float:
+    return length * (value - low) / max(high - low, 1e-9)

@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+# Matrices are small here: further threads would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
@@ -138,9 +143,12 @@ def main() -> None:
     given = parser.parse_args()
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     found = {}
-    for name in [given.only] if given.only else SCENES:
-        found[name] = measured(name)
-        print("\n".join(lines(name, found[name], kept.get(name, {}))), flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        # Nothing that an earlier run planned may be found.
+        os.environ["DOTWAVE_CACHE"] = folder
+        for name in [given.only] if given.only else SCENES:
+            found[name] = measured(name)
+            print("\n".join(lines(name, found[name], kept.get(name, {}))), flush=True)
     if given.keep:
         KEPT.parent.mkdir(parents=True, exist_ok=True)
         KEPT.write_text(json.dumps(kept | found, indent=1) + "\n", encoding="utf-8")

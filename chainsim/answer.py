@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .basis import Basis, basis_for
 from .floquet import chain_multipliers
 from .joint import correct_joint, rounding_of
+from .long import correct_long, is_long
 from .march import correct
 from .monodromy import joint_multipliers
 from .response import Outcome, Response, Stats
@@ -25,8 +26,12 @@ Bools = NDArray[np.bool_]
 ORDERS = (0, 1, 3, 5, 9, 17, 33, 65)
 # One Newton step measures the distance to first order; twice it covers the rest.
 SAFETY = 2.0
-# Rounding in the solve of one oscillator, times its sharpness 1/(delta omega) this is the floor of any estimate.
+# Rounding in the solve of one oscillator, times its sharpness this is the floor of any estimate. At a resonance the
+# sharpness is 1/(delta omega); what that makes of more than FINE is looked at oscillator by oscillator.
 ROUNDING = 4e-16
+FINE = 1e-12
+# A multiplier nearer to the circle than this cannot be told from one on it: without damping nothing settles.
+ROUNDED = 1e-15
 
 
 @dataclass(frozen=True)
@@ -67,16 +72,18 @@ def defect(stages: Stages, basis: Basis, x: Floats) -> Floats:
     where the step is not finite.
     """
     if stages.linear and basis.order and not stages.joint:
-        return _floor(stages)
+        return _floor(stages, basis, x)
     sharper = finer(basis)
-    moved = (correct_joint if stages.joint else correct)(stages, sharper, x, basis)
+    step = correct_joint if stages.joint else correct_long if is_long(stages) else correct
+    moved = step(stages, sharper, x, basis)
     mine, other = _shared(basis, sharper)
     size = np.abs(moved).max(axis=(0, 1))
     away = np.abs(moved[:, other] - x[:, mine]).max(axis=(0, 1))
     if not basis.order:
-        away = np.maximum(away, np.abs(moved[:, :2]).max(axis=(0, 1)))
+        # Without a drive what is found there is rounding, grown from stage to stage.
+        away = np.where(stages.drive == 0, away, np.maximum(away, np.abs(moved[:, :2]).max(axis=(0, 1))))
     relative = np.where(away == 0, 0.0, SAFETY * away / size)
-    relative = relative + (rounding_of(stages, basis, x) if stages.joint else _floor(stages))
+    relative = relative + (rounding_of(stages, basis, x) if stages.joint else _floor(stages, basis, x))
     return np.where(np.isfinite(relative), relative, np.inf)
 
 
@@ -87,9 +94,40 @@ def _shared(basis: Basis, sharper: Basis) -> tuple[list[int], list[int]]:
     return ([*mine, basis.size - 1], [*other, sharper.size - 1]) if basis.mean else (mine, other)
 
 
-def _floor(stages: Stages) -> Floats:
-    floor: Floats = ROUNDING * (1 + 1 / np.maximum(stages.delta.min() * stages.omega, 1e-12))
-    return floor
+def _floor(stages: Stages, basis: Basis, x: Floats) -> Floats:
+    """What rounding does to the answer x of a feed-forward chain, relative to its largest amplitude; shape (N,)."""
+    stiff = np.abs(stages.k).max(axis=0) + (stages.omega**2 if basis.order else 0.0)
+    resonant: Floats = ROUNDING * (1 + stiff / np.maximum(stages.delta.min() * stages.omega, 1e-12))
+    if (resonant <= FINE).all():
+        return resonant
+    size, sharp = np.abs(x).max(axis=1), _sharpness(stages, basis, x)
+    away = np.zeros(stages.k.shape)
+    own = (np.abs(stages.k) + (stages.omega**2 if basis.order else 0.0) + 3 * np.abs(stages.sign) * size**2) * size
+    for layer in stages.layers:
+        total = own[layer]
+        for links, source in ((stages.lam, layer - 1), (stages.other, layer + stages.stride)):
+            if links is not None:
+                total += np.abs(links[layer]) * np.where((source >= 0)[:, None], away[np.maximum(source, 0)], 0.0)
+        away[layer] = np.where(total > 0, total / sharp[layer], 0.0)
+    largest = size.max(axis=0)
+    relative = ROUNDING * (1 + np.where(largest > 0, away.max(axis=0) / largest, 0.0))
+    return np.where(resonant <= FINE, resonant, relative)
+
+
+def _sharpness(stages: Stages, basis: Basis, x: Floats) -> Floats:
+    """Least force that moves an oscillator by 1 from its answer x, by its harmonics one by one; float64, shape (n, N).
+
+    A small change a of a harmonic of impedance p costs ``p a + q a*``, so at least ``||p| - |q||``.
+    """
+    still = x[:, -1] ** 2 if basis.mean else 0.0
+    square = (x[:, : 2 * len(basis.harmonics)] ** 2).sum(axis=1)
+    own = stages.k + stages.sign * (3 * still + 1.5 * square)
+    sharp = np.abs(own) if basis.mean else np.full(own.shape, np.inf)
+    first = np.abs(stages.sign) * (0.75 * (x[:, 0] ** 2 + x[:, 1] ** 2) if basis.order else 0.0)
+    for harmonic in basis.harmonics:
+        impedance = np.hypot(own - (harmonic * stages.omega) ** 2, harmonic * stages.delta * stages.omega)
+        sharp = np.minimum(sharp, np.abs(impedance - (first if harmonic == 1 else 0.0)))
+    return sharp
 
 
 def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: float) -> Response:
@@ -102,7 +140,7 @@ def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: f
     if multipliers is None:
         known_only = np.where(solved, answer.x, np.nan)
         multipliers = (joint_multipliers if stages.joint else chain_multipliers)(stages, answer.basis, known_only)
-    stable = solved & (np.abs(multipliers) < 1).all(axis=(1, 2))
+    stable = solved & (np.abs(multipliers) < 1 - ROUNDED).all(axis=(1, 2))
     known = np.isfinite(multipliers).all(axis=(1, 2))
     outcome = answer.outcome.copy()
     outcome[solved & ~stable] = Outcome.UNSTABLE

@@ -1,4 +1,4 @@
-"""What was measured of single actuators: the section ``actuators`` of a device profile."""
+"""How actuators differ from the profile: what was measured (``actuators``) and what is not known (``spread``)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Actuator", "PlusMinus", "misplaced"]
+__all__ = ["Actuator", "ActuatorSpread", "PlusMinus", "misplaced"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Place = Annotated[int, Field(ge=0, le=1023)]
 
 
@@ -51,6 +52,23 @@ class Actuator(_Part):
     lam_set: Positive | None = None
     epsilon_per_volt: Positive | None = None
     plus_minus: PlusMinus = PlusMinus()
+
+
+class ActuatorSpread(_Part):
+    """How far actuators lie from the numbers that are known of them: standard deviations, each relative to its number.
+
+    Those are the measured numbers of ``actuators``, else the profile's. Independent from actuator to actuator, normal.
+
+    Attributes
+    ----------
+    frequency : of natural frequencies (0.01 is 1 %). damping : of delta. beta : of the cubic term.
+    lam : of what a link makes of the lam it is set to.
+    """
+
+    frequency: Share = 0.0
+    damping: Share = 0.0
+    beta: Share = 0.0
+    lam: Share = 0.0
 
 
 def misplaced(actuators: Iterable[Actuator], rows: int, cols: int, chain_length: int) -> str:

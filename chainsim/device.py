@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from .calibrated import Actuator, misplaced
+from .calibrated import Actuator, ActuatorSpread, misplaced
 from .chain import Chain, Closure
 from .errors import ProfileError
 from .yamlfile import read_model
@@ -97,6 +97,14 @@ class Note(_Part):
     why: Annotated[str, Field(min_length=1)]
 
 
+class _Places:
+    """Measured actuators by row and column."""
+
+    def __init__(self, actuators: tuple[Actuator, ...]) -> None:
+        self.actuators = actuators
+        self.at = {(one.row, one.col): one for one in actuators}
+
+
 class Device(_Part):
     """A grid of actuators, its chains, its drive and its amplifier.
 
@@ -115,7 +123,9 @@ class Device(_Part):
     omega : drive frequencies the device can make, over f0.
     drive : whether every chain has its own drive, or all chains are driven alike (`device`).
     bias : whether every actuator has its own DC bias channel.
-    actuators : what was measured of single actuators (`dotwave calibrate`).
+    actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
+    spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
+        lam: 0.0}`` (relative standard deviations). Plans then minimise the expected error. None: they are as they say.
     notes : field name -> where the value comes from.
     """
 
@@ -139,6 +149,7 @@ class Device(_Part):
     bias: Literal["none", "actuator"]
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
+    spread: ActuatorSpread | None = None
     notes: dict[str, Note] = {}
 
     @model_validator(mode="after")
@@ -168,7 +179,9 @@ class Device(_Part):
 
     @property
     def chain(self) -> Chain:
-        """One chain of the device, for the solvers."""
+        """One chain of the device, for the solvers: as measured where there is no other, else as the profile says."""
+        if self.actuators and self.rows * self.chains_per_row == 1:
+            return self.chain_at(0)
         return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure)
 
     def chain_at(self, row: int, index: int = 0) -> Chain:
@@ -196,10 +209,49 @@ class Device(_Part):
         first = self._measured(row, index)[0]
         return self.epsilon_per_volt if first is None or first.epsilon_per_volt is None else first.epsilon_per_volt
 
+    def alone(self, row: int, index: int = 0) -> Device:
+        """A device of nothing but this chain, with its own numbers; equal chains give equal devices.
+
+        Where a lam belongs to more than one link its range is what links make of it on average, and `lam_gain` how
+        much each differs from that; `drive_per_volt` has become `epsilon_per_volt`.
+        """
+        gain, unit = self.lam_gain(row, index), self.lam_unit(row, index)
+        chain, lam = self.chain_at(row, index), self.coupling.lam
+        own: tuple[Actuator, ...] = ()
+        if chain.spread is not None or np.any(gain != unit):
+            numbers = np.broadcast_arrays(chain.stiffness, chain.deltas, chain.betas, np.append(1.0, gain / unit))
+            own = tuple(
+                Actuator(
+                    row=0, col=col, f0_hz=self.f0_hz * math.sqrt(stiffness), delta=delta, beta=beta,
+                    lam=factor if col else None, lam_set=1.0 if col else None,
+                )
+                for col, (stiffness, delta, beta, factor) in enumerate(zip(*(n.tolist() for n in numbers), strict=True))
+            )  # fmt: skip
+        span = Span(min=lam.min * unit, max=lam.max * unit)
+        return self.model_copy(
+            update={
+                "rows": 1, "cols": self.chain_length, "delta": chain.delta, "beta": chain.beta,
+                "epsilon_per_volt": self.drive_per_volt(row, index), "actuators": own,
+                "coupling": self.coupling.model_copy(update={"lam": span}),
+            }
+        )  # fmt: skip
+
+    def lam_unit(self, row: int, index: int = 0) -> float:
+        """What the links of a chain make of a lam of 1 they share, on average; 1 where each has its own."""
+        gain = self.lam_gain(row, index)
+        return 1.0 if self.coupling.scope == "link" or not len(gain) else float(np.mean(gain))
+
     def _measured(self, row: int, index: int) -> list[Actuator | None]:
-        known = {(one.row, one.col): one for one in self.actuators}
+        known = self._places
+        if known.actuators is not self.actuators:
+            # A copy with other actuators has brought the places of those it had before.
+            known = self.__dict__["_places"] = _Places(self.actuators)
         start = index * self.chain_length
-        return [known.get((row, col)) for col in range(start, start + self.chain_length)]
+        return [known.at.get((row, col)) for col in range(start, start + self.chain_length)]
+
+    @cached_property
+    def _places(self) -> _Places:
+        return _Places(self.actuators)
 
     @property
     def escape_amplitude(self) -> float:
@@ -223,7 +275,8 @@ class Device(_Part):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        return self.model_dump(mode="json", by_alias=True)
+        left_out = {"spread"} if self.spread is None else set()
+        return self.model_dump(mode="json", by_alias=True, exclude=left_out)
 
 
 def device_names() -> list[str]:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chain import Chain, Closure, CouplingKind, Setting
-from .envelope_flow import SlowFlow, Steps
+from .envelope_flow import SlowFlow
+from .envelope_steps import Steps
 from .errors import ChainError
 from .response import Outcome, Stats
 
@@ -21,6 +22,7 @@ Complexes = NDArray[np.complex128]
 # Phase of the fastest slow rate in one step of the first try; steps are halved from there.
 FIRST_STEP = 0.5
 HALVINGS = 10
+MOST_STEPS = 1 << 20  # Of one pass; what needs more is out of budget.
 # The method is of order 4: halving the steps removes 15/16 of the error.
 GAIN = 15.0
 
@@ -28,13 +30,14 @@ GAIN = 15.0
 class EnvelopeError(ChainError, ValueError):
     """The envelope was asked for what it cannot follow.
 
-    Examples: a DC bias or preload; a damping that is not small; times that do not increase; a drive of another shape.
+    Examples: a damping that is not small; times that do not increase; a drive of another shape; links that change under
+    a bias.
     """
 
 
 @dataclass(frozen=True)
 class Trace:
-    """How the amplitudes went, z_m = Re(phasor_m e^{i omega tau}).
+    """How the amplitudes went, z_m = Re(phasor_m e^{i omega tau}), about the equilibrium under constant forces.
 
     Attributes
     ----------
@@ -44,7 +47,7 @@ class Trace:
         trace means nothing) or out_of_budget (the steps could not be made short enough).
     error_estimate : float64, shape (N,), of the integration, relative to each setting's largest amplitude. What the
         slow flow itself leaves out is O(delta, lam, detuning, beta a^2) of the amplitude in order 1, and the square of
-        that in order 2.
+        that in order 2; beside an equilibrium z0 also O(beta z0 a).
     stats : `rhs_evals` counts evaluations of the slow flow of one oscillator.
     """
 
@@ -93,34 +96,42 @@ def follow(
     if not tol > 0:
         raise EnvelopeError(f"tol: expected a number > 0, got {tol}")
     plan = _Course.of(chain, setting, tau, epsilon, lam)
-    flow = SlowFlow.of(chain, setting, plan.lam.mean(axis=0), order)
-    begin = _begin(flow, plan, start)
     with np.errstate(all="ignore"):
-        return _halved(chain, flow, plan, begin, tol, began)
+        changes = np.ptp(plan.lam, axis=0).any()
+        # A mean of equal numbers may differ from them in its last bit.
+        flow = SlowFlow.of(chain, setting, plan.lam.mean(axis=0) if changes else plan.lam[0], order)
+        if flow.lean is not None and changes:
+            raise EnvelopeError("lam: links cannot change under a bias or preload; use rung ode")
+        begin = _begin(flow, plan, start)
+        return _halved(hilltop(chain, setting, plan.lam).min(axis=0), flow, plan, begin, tol, began)
 
 
 def slow_refusal(chain: Chain, setting: Setting) -> str:
     """Why the slow flow is not true of this system, in one sentence that names the cure; "" when it can be."""
-    if chain.rows > 1 or chain.closure is Closure.BIDIRECTIONAL:
-        return "a grid or bidirectional chain is not followed by the envelope; use rung harmonic_balance or ode"
-    if setting.bias.any() or setting.preload.any():
-        return "a bias or preload is not followed by the envelope; use rung harmonic_balance or ode"
     if not chain.deltas.max() < 1:
         return f"delta {chain.deltas.max()} is no small damping, so nothing is slow; use rung ode"
-    if bool((_stiffness(chain, setting.lam) <= 0.3).any()):
+    if bool((_stiffness(chain, setting, setting.lam) <= 0.3).any()):
         return "an oscillator has a stiffness of 0.3 or less, so nothing is slow; use rung ode"
     return ""
 
 
-def hilltop(chain: Chain, lam: Floats) -> Floats:
-    """The amplitude beyond which an oscillator has left its well, sqrt(k/-beta), k = 1 + lam; inf unless beta < 0."""
-    stiffness = _stiffness(chain, lam)
+def hilltop(chain: Chain, setting: Setting, lam: Floats) -> Floats:
+    """The amplitude beyond which an oscillator has left its well, sqrt(k/-beta), k = 1 + lam; inf unless beta < 0.
+
+    lam : float64, shape (..., n), links in place of those of the setting.
+    """
+    stiffness = _stiffness(chain, setting, lam)
     soft = chain.betas < 0
     return np.where(soft, np.sqrt(np.maximum(stiffness, 0) / np.where(soft, -chain.betas, 1.0)), np.inf)
 
 
-def _stiffness(chain: Chain, lam: Floats) -> Floats:
-    return chain.stiffness + (lam if chain.kind is CouplingKind.RESISTOR else 0 * lam)
+def _stiffness(chain: Chain, setting: Setting, lam: Floats) -> Floats:
+    if chain.kind is CouplingKind.AMPLIFIER:
+        return chain.stiffness + 0 * lam
+    own: Floats = chain.stiffness + lam
+    if chain.closure is Closure.BIDIRECTIONAL:
+        own[..., :-1] += lam[..., 1:]
+    return own if setting.lam_y is None else own + setting.lam_y
 
 
 @dataclass(frozen=True)
@@ -159,34 +170,51 @@ def _begin(flow: SlowFlow, plan: _Course, start: ArrayLike | None) -> Complexes:
     if start is None:
         return flow.at_rest(plan.drive[0], plan.lam[0])
     amplitude = np.asarray(start, dtype=np.complex128)
-    if amplitude.shape not in (flow.rate.shape[1:], flow.rate.shape) or not np.isfinite(amplitude).all():
-        raise EnvelopeError(f"start: expected finite amplitudes of shape {flow.rate.shape}, got {amplitude.shape}")
-    return flow.slow_part(np.broadcast_to(amplitude, flow.rate.shape), plan.drive[0], plan.lam[0])
+    shape = flow.lam.shape
+    if amplitude.shape not in (shape[1:], shape) or not np.isfinite(amplitude).all():
+        raise EnvelopeError(f"start: expected finite amplitudes of shape {shape}, got {amplitude.shape}")
+    return flow.slow_part(np.broadcast_to(amplitude, shape), plan.drive[0], plan.lam[0])
 
 
-def _halved(chain: Chain, flow: SlowFlow, plan: _Course, begin: Complexes, tol: float, began: float) -> Trace:
-    """Integrate with steps halved until halving them changes less than `tol`."""
-    fastest = float(np.max(np.abs(flow.rate) + np.abs(flow.weight) * (plan.lam + np.ptp(plan.lam, axis=0))))
-    cuts = np.maximum(np.ceil(np.diff(plan.tau) * fastest / FIRST_STEP), 1).astype(np.int64)
+def _halved(top: Floats, flow: SlowFlow, plan: _Course, begin: Complexes, tol: float, began: float) -> Trace:
+    """Integrate with steps halved until halving them changes less than `tol`; `top` is the hilltop, (N, n)."""
+    changing = np.ptp(plan.lam, axis=0).max() * np.abs(flow.weight).max()
+    fastest = float(np.abs(flow.rate).sum(axis=2).max() + changing)
+    if not np.isfinite(fastest) or (flow.lean is not None and not np.isfinite(flow.lean.place).all()):
+        return _nothing(plan, began)
+    needed = np.maximum(np.ceil(np.diff(plan.tau) * fastest / FIRST_STEP), 1)
+    if 2 * needed.sum() > MOST_STEPS:
+        return _nothing(plan, began)
+    cuts = needed.astype(np.int64)
     phasor, evals = _integrate(flow, plan, begin, cuts), 4 * int(cuts.sum())
     for _ in range(HALVINGS):
         cuts = 2 * cuts
         coarse, phasor = phasor, _integrate(flow, plan, begin, cuts)
         evals += 4 * int(cuts.sum())
-        top = (hilltop(chain, plan.lam)).min(axis=0)
         escaped = ~(np.abs(phasor) <= top).all(axis=(0, 2))
         size = np.maximum(np.abs(phasor).max(axis=(0, 2)), 1e-300)
         error = np.abs(phasor - coarse).max(axis=(0, 2)) / size / GAIN
         good = (error <= tol) | escaped
-        if good.all():
+        if good.all() or 2 * cuts.sum() > MOST_STEPS:
             break
     outcome = np.empty(len(good), dtype=object)
     outcome.fill(Outcome.OK)
     outcome[~good], outcome[escaped] = Outcome.OUT_OF_BUDGET, Outcome.ESCAPED
-    stats = Stats(rhs_evals=evals * flow.rate.size, seconds=time.perf_counter() - began)
+    stats = Stats(rhs_evals=evals * flow.lam.size, seconds=time.perf_counter() - began)
     for array in (phasor, outcome, error):
         array.flags.writeable = False
     return Trace(plan.tau, phasor, outcome, np.where(escaped, np.inf, error), stats)
+
+
+def _nothing(plan: _Course, began: float) -> Trace:
+    """What is said where the slow flow has no numbers: out of budget."""
+    size = plan.drive.shape[1]
+    outcome = np.empty(size, dtype=object)
+    outcome.fill(Outcome.OUT_OF_BUDGET)
+    phasor, error = np.full(plan.lam.shape, np.nan, dtype=np.complex128), np.full(size, np.inf)
+    for array in (phasor, outcome, error):
+        array.flags.writeable = False
+    return Trace(plan.tau, phasor, outcome, error, Stats(seconds=time.perf_counter() - began))
 
 
 def _integrate(flow: SlowFlow, plan: _Course, slow: Complexes, cuts: NDArray[np.int64]) -> Complexes:
@@ -199,15 +227,19 @@ def _integrate(flow: SlowFlow, plan: _Course, slow: Complexes, cuts: NDArray[np.
         # Instants of a regular lattice differ by rounding only; one set of coefficients serves them all.
         key = float(f"{h:.12g}")
         if key not in made:
-            made[key] = Steps.of(flow.rate, np.full((len(slow), 1), key))
-        steps = made[key]
+            made[key] = Steps.of(flow.rate, key)
+        steps, still = made[key], np.array_equal(plan.lam[k], plan.lam[k + 1])
+        fixed = flow.lam if still and np.array_equal(plan.lam[k], flow.lam) else plan.lam[k]
         for j in range(int(count)):
             u, v = j / int(count), (j + 1) / int(count)
             drive = (
                 plan.drive[k] + u * (plan.drive[k + 1] - plan.drive[k]),
                 (plan.drive[k] + v * (plan.drive[k + 1] - plan.drive[k])),
             )
-            lam = plan.lam[k] + u * (plan.lam[k + 1] - plan.lam[k]), plan.lam[k] + v * (plan.lam[k + 1] - plan.lam[k])
+            lam = (fixed, fixed)
+            if not still:
+                change = plan.lam[k + 1] - plan.lam[k]
+                lam = plan.lam[k] + u * change, plan.lam[k] + v * change
             slow = steps.take(flow, slow, drive, lam)
         found[k + 1] = flow.amplitude(slow, plan.drive[k + 1], plan.lam[k + 1])
     return found

@@ -1,35 +1,55 @@
-"""The slow flow of the complex amplitudes: its right side, its fixed points, its steps.
+"""The slow flow of the complex amplitudes: its right side, and how it begins from rest.
 
-With z_m = Re(A_m e^{i omega tau}) and the third harmonic B_m slaved, every oscillator obeys
+About the equilibrium z0 under constant forces (0 without them), with z_m = z0_m + Re(A_m e^{i omega tau}) + slaved
+mean C, second harmonic E and third harmonic B, every oscillator obeys
 
-    A'' + (2 i omega + delta) A' + (1 + lam - omega^2 + i delta omega) A + N(A) = lam A_{m-1} + F,
-    N = 3/4 beta |A|^2 A + 3/4 beta conj(A)^2 B,    B = -(beta/4) A^3 / (1 + lam - 9 omega^2 + 3 i delta omega).
+    A'' + (2 i omega + delta) A' + (k + 3 beta z0^2 - omega^2 + i delta omega) A + N(A) = links + F,
+    N = 3/4 beta |A|^2 A + 3 beta z0 (2 C A + E conj(A)) + 3/4 beta conj(A)^2 B,
+    C = -(k + ..)^-1 (3/2) beta z0 |A|^2, E = -(.. - 4 omega^2 + 2 i delta omega)^-1 (3/2) beta z0 A^2,
+    B = -((beta/4) A^3 + 3 beta z0 A E)/(k + .. - 9 omega^2 + 3 i delta omega).
 
-Order 1 drops A'' and B. Order 2 keeps both roots of the linear part exactly: A = a + c, where a turns slowly
-(a' = s a + G/(s - r), s near 0) and c, which turns at r near -2 i omega, follows its drive: c = G/((s - r) r). G is all
-that is not in the linear part. Nothing faster than the detuning is left to integrate, and both orders have the exact
-fixed points of their balance.
+Order 1 drops A'' and B. Order 2 splits A = a + c as `envelope_linear` does, exactly in all that is linear: a turns
+slowly, c follows its drive. Nothing faster than the detuning is left to integrate, and both orders have the exact fixed
+points of their balance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain, CouplingKind, Setting
+from .chain import Chain, Closure, CouplingKind, Setting
+from .envelope_linear import coupling, diagonal, inverse, solvent, times
 
-__all__ = ["SlowFlow", "Steps", "effect_of_third", "fixed_point", "pick", "rates_at"]
+__all__ = ["Lean", "SlowFlow"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# The slaved part feeds on itself with a factor of about lam/4. Each round leaves one power more of it: two are enough
-# where it is faint, three elsewhere.
-ROUNDS = (2, 3)
-FAINT = 0.01
-NEWTON_STEPS = 30
+ROUNDS = 2  # How often the nonlinear slaved part is found from itself; each leaves one power of beta a^2/4 more.
+STARTS = 6  # The same for the state of rest, which is found once.
+STEPS = 40
+
+
+@dataclass(frozen=True)
+class Lean:
+    """What a constant force adds: the cubic term seen from the equilibrium beside it.
+
+    Attributes
+    ----------
+    place : float64, shape (N, n), z0; NaN where the force holds none in the well. kappa : float64, shape (N, n),
+        3 beta z0.
+    mean : float64, shape (N, n, n), what turns kappa |A|^2/2 into -C. second : complex128, shape (N, n, n), what turns
+        kappa A^2/2 into -E.
+    """
+
+    place: Floats
+    kappa: Floats
+    mean: Floats
+    second: Complexes
 
 
 @dataclass(frozen=True)
@@ -40,228 +60,183 @@ class SlowFlow:
     ----------
     beta : float64, shape (n,) or (1,), of the chain. omega : float64, shape (N, 1).
     back : 1 where a link also pulls its receiver back (resistor), 0 where not (amplifier).
-    lam : float64, shape (N, n), links about which the linear part is exact; ``lam[:, 0]`` closes a ring.
-    rate : complex128, shape (N, n), s. weight : complex128, shape (N, n), what turns G into a'.
-    slave : complex128, shape (N, n), what turns G into c; 0 in order 1.
-    third : complex128, shape (N, n), what turns A^3 into B; 0 in order 1.
-    stiff : complex128, shape (N, n), k - omega^2 + i delta omega with k = 1 + lam, or what the chain has instead.
-    rounds : how often the slaved part is found from itself; 0 in order 1.
+    both : whether a link acts both ways. turns : whether no oscillator acts on one before it.
+    lam : float64, shape (N, n), links about which the linear part is exact.
+    rate, weight, fast, slave : complex128, shape (N, n, n), S, W, R and R^-1 W (0 in order 1).
+    stiff : complex128, shape (N, n, n), Z. third : complex128, shape (N, n), what turns the drive of B into B; 0 in
+        order 1.
+    lean : None without constant forces. rounds : how often the slaved part is found from itself; 0 in order 1.
     """
 
     beta: Floats
     back: float
+    both: bool
+    turns: bool
     omega: Floats
     lam: Floats
     rate: Complexes
     weight: Complexes
+    fast: Complexes
     slave: Complexes
-    third: Complexes
     stiff: Complexes
+    third: Complexes
+    lean: Lean | None
     rounds: int
 
     @classmethod
     def of(cls, chain: Chain, setting: Setting, lam: Floats, order: int) -> SlowFlow:
         """The flow of `order` 1 or 2 about the links `lam`, shape (N, n)."""
-        delta, omega, beta = chain.deltas, setting.omega[:, None], chain.betas
-        back = float(chain.kind is CouplingKind.RESISTOR)
-        k = chain.stiffness + back * lam
-        stiff = (k - omega**2).astype(np.complex128) + 1j * delta * omega
+        n = lam.shape[1]
+        delta, beta = np.broadcast_to(chain.deltas, lam.shape), chain.betas
+        omega = setting.omega[:, None]
+        spring = coupling(chain, setting, lam) + diagonal(np.broadcast_to(chain.stiffness, lam.shape).copy())
+        lean = _lean(setting, spring, beta, delta)
+        if lean is not None:
+            spring = spring + diagonal(lean.kappa * lean.place)
+        each = np.arange(n)
+        own, damping = spring[:, each, each], np.asarray(2j * omega + delta, dtype=np.complex128)
+        stiff = spring + diagonal(np.asarray(1j * delta * omega - omega**2, dtype=np.complex128))
+        third = np.asarray((order == 2) / (9 * omega**2 - own - 3j * delta * omega), dtype=np.complex128)
+        nature = (float(chain.kind is CouplingKind.RESISTOR), chain.closure is Closure.BIDIRECTIONAL)
+        head = (beta, *nature, chain.feed_forward, omega, lam)
         if order == 1:
-            weight = np.broadcast_to(1 / (2j * omega + delta), lam.shape)
-            nothing = np.zeros(lam.shape, dtype=np.complex128)
-            return cls(beta, back, omega, lam, -stiff * weight, weight, nothing, nothing, stiff, 0)
-        root = 1j * np.sqrt(k - 0.25 * delta**2)
-        slow, fast = -1j * omega - 0.5 * delta + root, -1j * omega - 0.5 * delta - root
-        weight = 0.5 / root
-        slave = weight / fast
-        third = -0.25 * beta.astype(np.complex128) / (stiff - 8 * omega**2 + 2j * delta * omega)
-        strength = float(np.max(np.abs(slave) * (np.abs(lam) + np.abs(stiff))))
-        return cls(beta, back, omega, lam, slow, weight, slave, third, stiff, ROUNDS[strength > FAINT])
+            weight, none = diagonal(1 / damping), np.zeros(spring.shape, dtype=np.complex128)
+            return cls(*head, -weight @ stiff, weight, none, none, stiff, third, lean, 0)
+        root: Complexes = 1j * np.sqrt(own - 0.25 * delta**2)
+        slow = solvent(damping, stiff, root - 0.5 * damping)
+        fast = solvent(damping, stiff, -root - 0.5 * damping)
+        weight = inverse(slow - fast)
+        return cls(*head, slow, weight, fast, inverse(fast) @ weight, stiff, third, lean, ROUNDS)
+
+    @cached_property
+    def bend(self) -> Floats:
+        """3/4 beta."""
+        return 0.75 * self.beta
+
+    @cached_property
+    def back_bend(self) -> Complexes:
+        """What the third harmonic gives back: 3/16 beta^2 times `third`."""
+        back: Complexes = 0.1875 * self.beta**2 * self.third
+        return back
+
+    @property
+    def firm(self) -> Floats:
+        """The least stiffness of any oscillator about its equilibrium; float64, shape (N,)."""
+        own = np.diagonal(self.stiff, axis1=1, axis2=2).real + self.omega**2
+        return np.asarray(own.min(axis=1))
 
     def cubic(self, amplitude: Complexes) -> Complexes:
         """N(A)."""
-        square = (amplitude * amplitude.conj()).real
-        if not self.rounds:
-            return 0.75 * self.beta * square * amplitude
-        return 0.75 * self.beta * (square + self.third * square**2) * amplitude
+        square = amplitude.real**2 + amplitude.imag**2
+        if self.lean is None:
+            return self.gain(square) * amplitude
+        mean, second, third = self.harmonics(amplitude)
+        bent: Complexes = self.lean.kappa * (2 * mean * amplitude + second * amplitude.conj())
+        return 0.75 * self.beta * (square * amplitude + amplitude.conj() ** 2 * third) + bent
+
+    def gain(self, square: Floats) -> Complexes:
+        """N(A)/A by |A|^2, without constant forces: 3/4 beta |A|^2, and what B = third beta/4 A^3 gives back."""
+        return (self.bend + self.back_bend * square) * square
+
+    def harmonics(self, amplitude: Complexes) -> tuple[Floats, Complexes, Complexes]:
+        """C, E and B that go with A, shape (N, n) each."""
+        own = 0.25 * self.beta * amplitude**3
+        if self.lean is None:
+            nothing = np.zeros(amplitude.shape)
+            return nothing, nothing.astype(np.complex128), self.third * own
+        kappa = self.lean.kappa
+        mean = -0.5 * times(self.lean.mean, kappa * (amplitude.real**2 + amplitude.imag**2))
+        second = -0.5 * times(self.lean.second, kappa * amplitude**2)
+        return mean, second, self.third * (own + kappa * amplitude * second)
 
     def force(self, amplitude: Complexes, drive: Complexes, lam: Floats) -> Complexes:
         """G: everything but the linear part about `self.lam`, under the links `lam`; shape (N, n)."""
-        push = lam * amplitude[:, np.arange(-1, lam.shape[1] - 1)] - self.cubic(amplitude)
-        if lam is not self.lam:
-            push -= self.back * (lam - self.lam) * amplitude
+        push = self.pull(amplitude, lam)
         push[:, 0] += drive
+        return push
+
+    def pull(self, amplitude: Complexes, lam: Floats) -> Complexes:
+        """G without the drive."""
+        push = -self.cubic(amplitude)
+        if lam is not self.lam:
+            more = lam - self.lam
+            push += more * (np.roll(amplitude, 1, axis=1) - self.back * amplitude)
+            if self.both:
+                push[:, :-1] += more[:, 1:] * (amplitude[:, 1:] - amplitude[:, :-1])
         return push
 
     def amplitude(self, slow: Complexes, drive: Complexes, lam: Floats) -> Complexes:
         """A = a + c of the slow part a."""
-        whole = slow
+        if not self.rounds:
+            return slow
+        return self.slaved(slow + self.slave[:, :, 0] * drive[:, None], lam)
+
+    def slaved(self, base: Complexes, lam: Floats) -> Complexes:
+        """A from a and the part of c that belongs to the drive."""
+        whole = base
         for _ in range(self.rounds):
-            whole = slow + self.slave * self.force(whole, drive, lam)
+            whole = base + times(self.slave, self.pull(whole, lam))
         return whole
 
     def slow_part(self, amplitude: Complexes, drive: Complexes, lam: Floats) -> Complexes:
         """The slow part of a motion that follows its drive with amplitude A."""
-        return amplitude - self.slave * self.force(amplitude, drive, lam)
+        if not self.rounds:
+            return amplitude
+        return amplitude - times(self.slave, self.force(amplitude, drive, lam))
 
     def at_rest(self, drive: Complexes, lam: Floats) -> Complexes:
-        """The slow part of z = z' = 0 under a drive that has just set in: a = -conj(c), so that both vanish."""
-        whole = np.zeros(self.rate.shape, dtype=np.complex128)
-        follows = whole
-        for _ in range(self.rounds):
-            follows = self.slave * self.force(whole, drive, lam)
-            whole = follows - follows.conj()
-        return -follows.conj()
+        """The slow part of z = z' = 0 under forces that have just set in.
+
+        With a = p + i y, z = 0 gives p, and z' = Re((S + i omega) a + (R + i omega) c) + (that of the harmonics) = 0
+        gives y; what is not linear in them is known from the round before.
+        """
+        omega, one = self.omega, 1j * self.omega[:, :, None] * np.eye(self.lam.shape[1])
+        place = np.zeros(self.lam.shape) if self.lean is None else self.lean.place
+        if not self.rounds:
+            return -place.astype(np.complex128)
+        turn = self.rate + one
+        back = inverse(turn.imag)
+        slow = -place.astype(np.complex128)
+        for _ in range(STARTS):
+            whole = self.amplitude(slow, drive, lam)
+            follows, (mean, second, third) = whole - slow, self.harmonics(whole)
+            at = -place - mean - (follows + second + third).real
+            speed = times(self.fast + one, follows) + 1j * omega * (2 * second + 3 * third)
+            slow = np.asarray(at + 1j * times(back, times(turn.real, at) + speed.real), dtype=np.complex128)
+        return slow
 
     def driven(self, slow: Complexes, drive: Complexes, lam: Floats) -> Complexes:
         """What drives the slow part: a' = rate a + driven."""
-        return self.weight * self.force(self.amplitude(slow, drive, lam), drive, lam)
+        return times(self.weight, self.force(self.amplitude(slow, drive, lam), drive, lam))
+
+    def pick(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> SlowFlow:
+        """The flow of some settings."""
+        lean = self.lean
+        if lean is not None:
+            lean = Lean(*(getattr(lean, each.name)[index] for each in fields(lean)))
+        each = ("omega", "lam", "rate", "weight", "fast", "slave", "stiff", "third")
+        return replace(self, lean=lean, **{name: getattr(self, name)[index] for name in each})
 
 
-@dataclass(frozen=True)
-class Steps:
-    """Coefficients of one step of the fourth-order exponential Runge-Kutta method of Cox and Matthews (J. Comput. Phys.
-    176, 2002, eq. 26-29), which has the linear part exactly; each complex128, shape (N, n).
-    """
-
-    whole: Complexes
-    half: Complexes
-    stage: Complexes
-    first: Complexes
-    middle: Complexes
-    last: Complexes
-
-    @classmethod
-    def of(cls, rate: Complexes, h: Floats) -> Steps:
-        """For steps `h`, shape (N, 1)."""
-        one, two, three = _phi(rate * h)
-        return cls(
-            np.exp(rate * h), np.exp(0.5 * rate * h), 0.5 * h * _phi(0.5 * rate * h)[0],
-            h * (one - 3 * two + 4 * three), 2 * h * (two - 2 * three), h * (4 * three - two),
-        )  # fmt: skip
-
-    def take(
-        self, flow: SlowFlow, slow: Complexes, drive: tuple[Complexes, Complexes], lam: tuple[Floats, Floats]
-    ) -> Complexes:
-        """One step; `drive` and `lam` are given at its start and end and are linear between."""
-        (f0, f1), (l0, l1) = drive, lam
-        fm, lm = 0.5 * (f0 + f1), 0.5 * (l0 + l1)
-        n0 = flow.driven(slow, f0, l0)
-        a = self.half * slow + self.stage * n0
-        na = flow.driven(a, fm, lm)
-        b = self.half * slow + self.stage * na
-        nb = flow.driven(b, fm, lm)
-        c = self.half * a + self.stage * (2 * nb - n0)
-        return self.whole * slow + self.first * n0 + self.middle * (na + nb) + self.last * flow.driven(c, f1, l1)
-
-
-def fixed_point(flow: SlowFlow, drive: Complexes, start: Complexes) -> tuple[Complexes, NDArray[np.bool_]]:
-    """Amplitudes (N, n) at rest in the slow flow near `start`, by Newton, and where they were found."""
-    found = start.copy()
-    ok = np.zeros(len(start), dtype=bool)
-    todo = np.flatnonzero(np.isfinite(start).all(axis=1))
-    for _ in range(NEWTON_STEPS):
-        if not len(todo):
+def _lean(setting: Setting, spring: Floats, beta: Floats, delta: Floats) -> Lean | None:
+    """The equilibrium under constant forces by Newton from 0, and what hangs on it."""
+    load = np.array(setting.bias)
+    load[:, 0] += setting.preload
+    if not load.any():
+        return None
+    place = np.zeros(load.shape)
+    for _ in range(STEPS):
+        residual = times(spring, place) + beta * place**3 - load
+        step = times(inverse(spring + diagonal(3 * beta * place**2)), residual)
+        place = place - step
+        if not (np.abs(step) > 1e-14 * np.abs(place)).any():
             break
-        part, here = pick(flow, todo), found[todo]
-        residual = part.stiff * here + part.cubic(here) - part.lam * np.roll(here, 1, axis=1)
-        residual[:, 0] -= drive[todo]
-        step = _solve(_jacobian(part, here), residual)
-        found[todo] = here - step
-        size = np.abs(step).max(axis=1) / np.maximum(np.abs(found[todo]).max(axis=1), 1e-300)
-        still = ~(size <= 1e-13)
-        ok[todo[~still | (size <= 1e-11)]] = True
-        todo = todo[still & np.isfinite(size)]
-    return found, ok
-
-
-def rates_at(flow: SlowFlow, amplitude: Complexes) -> Complexes:
-    """Eigenvalues of the slow flow about `amplitude`, shape (N, 2n), per unit of tau.
-
-    With dG = (stiff - J) dA, the slaving dA = da + slave dG gives da' = rate da + weight dG (1 - slave dG)^-1 da.
-    """
-    values = np.full((len(amplitude), 2 * amplitude.shape[1]), np.nan, dtype=np.complex128)
-    known = np.flatnonzero(np.isfinite(amplitude).all(axis=1))
-    if len(known):
-        here = pick(flow, known)
-        force = _real(here.stiff) - _jacobian(here, amplitude[known])
-        whole = np.linalg.inv(np.eye(values.shape[1]) - _real(here.slave) @ force)
-        values[known] = np.linalg.eigvals(_real(here.rate) + _real(here.weight) @ force @ whole)
-    return values
-
-
-def effect_of_third(flow: SlowFlow, amplitude: Complexes) -> Floats:
-    """How far the third harmonics move the fixed point, relative to its largest amplitude; float64, shape (N,)."""
-    third = -0.25 * flow.beta * amplitude**3
-    faint = flow.stiff - 8 * flow.omega**2
-    third = (third + flow.lam * np.roll(third / faint, 1, axis=1)) / faint
-    moved = _solve(_jacobian(flow, amplitude), 0.75 * flow.beta * amplitude.conj() ** 2 * third)
-    effect: Floats = np.abs(moved).max(axis=1) / np.maximum(np.abs(amplitude).max(axis=1), 1e-300)
-    return effect
-
-
-def pick(flow: SlowFlow, index: NDArray[np.intp] | NDArray[np.bool_]) -> SlowFlow:
-    """The flow of some settings."""
-    return SlowFlow(
-        flow.beta, flow.back, flow.omega[index], flow.lam[index], flow.rate[index], flow.weight[index],
-        flow.slave[index], flow.third[index], flow.stiff[index], flow.rounds,
-    )  # fmt: skip
-
-
-def _jacobian(flow: SlowFlow, amplitude: Complexes) -> Floats:
-    """Of the balance by (Re A, Im A), shape (N, 2n, 2n): dZ = P dA + Q conj(dA) - lam dA_before."""
-    n = amplitude.shape[1]
-    square = (amplitude * amplitude.conj()).real
-    by = flow.stiff + 1.5 * flow.beta * square + 2.25 * flow.beta * flow.third * square**2
-    against = (0.75 + 1.5 * flow.third * square) * flow.beta * amplitude**2
-    matrix = np.zeros((len(amplitude), 2 * n, 2 * n))
-    m, before = np.arange(n), (np.arange(n) - 1) % n
-    matrix[:, m, m], matrix[:, m, n + m] = (by + against).real, -(by - against).imag
-    matrix[:, n + m, m], matrix[:, n + m, n + m] = (by + against).imag, (by - against).real
-    matrix[:, m, before] -= flow.lam
-    matrix[:, n + m, n + before] -= flow.lam
-    return matrix
-
-
-def _real(factor: Complexes) -> Floats:
-    """Multiplication by `factor` (N, n) as matrices on (Re, Im), shape (N, 2n, 2n)."""
-    n = factor.shape[1]
-    matrix = np.zeros((len(factor), 2 * n, 2 * n))
-    m = np.arange(n)
-    matrix[:, m, m] = matrix[:, n + m, n + m] = factor.real
-    matrix[:, m, n + m], matrix[:, n + m, m] = -factor.imag, factor.imag
-    return matrix
-
-
-def _solve(matrix: Floats, right: Complexes) -> Complexes:
-    n = right.shape[1]
-    both = np.concatenate([right.real, right.imag], axis=1)[..., None]
-    wild = ~(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(both).all(axis=(1, 2)))
-    if wild.any():
-        matrix, both = matrix.copy(), both.copy()
-        matrix[wild], both[wild] = np.eye(2 * n), np.nan
-    try:
-        step = np.linalg.solve(matrix, both)[..., 0]
-    except np.linalg.LinAlgError:
-        # One setting exactly at a fold must not stop the others.
-        step = (np.linalg.pinv(matrix) @ both)[..., 0]
-    answer: Complexes = step[:, :n] + 1j * step[:, n:]
-    return answer
-
-
-def _phi(z: Complexes) -> tuple[Complexes, Complexes, Complexes]:
-    """phi_1, phi_2, phi_3: (e^z - 1)/z and so on, by their series where the formulas cancel."""
-    series: list[Complexes] = []
-    for k in (1, 2, 3):
-        term = np.full(z.shape, 1 / (1, 1, 2, 6)[k], dtype=np.complex128)
-        total = term.copy()
-        for j in range(1, 20):
-            term = term * z / (j + k)
-            total = total + term
-        series.append(total)
-    small = np.abs(z) < 1
-    safe = np.where(small, 1.0, z)
-    one = np.where(small, series[0], (np.exp(safe) - 1) / safe)
-    two = np.where(small, series[1], (one - 1) / safe)
-    three = np.where(small, series[2], (two - 0.5) / safe)
-    return one, two, three
+    # Newton from 0 climbs to the equilibrium in the well; past its fold it finds none, or one beyond the hill.
+    stiffness = np.diagonal(spring, axis1=1, axis2=2) + 3 * beta * place**2
+    held = (np.abs(step) <= 1e-9 * np.abs(place) + 1e-300) & (stiffness > 0)
+    place[~held.all(axis=1)] = np.nan
+    kappa = 3 * beta * place
+    firm = spring + diagonal(kappa * place)
+    omega = setting.omega[:, None]
+    second = inverse(firm + diagonal(np.asarray(2j * delta * omega - 4 * omega**2, dtype=np.complex128)))
+    return Lean(place, kappa, inverse(firm), second)

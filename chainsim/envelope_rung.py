@@ -8,31 +8,34 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .answer import defect
+from .basis import basis_for
 from .chain import Chain, Setting
 from .envelope import slow_refusal
-from .envelope_flow import SlowFlow, effect_of_third
-from .envelope_settle import ORDER, Arrival, reached
-from .response import Branch, Outcome, Response
+from .envelope_flow import SlowFlow
+from .envelope_linear import times
+from .envelope_run import ORDER
+from .envelope_settle import Arrival, reached
+from .march import branches_of
+from .response import Outcome, Response
 from .rung import Rung, Start
-from .starts import Cubic
+from .scaling import Stages
 
 __all__ = ["EnvelopeRung"]
 
-# The joint Newton of the fixed point is dense.
+# The matrices of the slow flow are dense.
 MOST = 64
-# Rounding of one oscillator's balance, times its sharpness 1/(delta omega) and the length of the chain.
-ROUNDING = 1e-15
 
 
 class EnvelopeRung(Rung):
-    """The slow flow of the complex amplitudes with its third harmonic slaved."""
+    """The slow flow of the complex amplitudes, with its mean, second and third harmonics slaved."""
 
     name = "envelope"
-    order = "order 2: O((delta, lam, detuning, beta a^2)^2) of a transient; a steady state O(beta^3 a^6)"
-    valid = "delta, lam, detuning and beta a^2 << 1; transients, frame changes and slow beats, without constant forces"
+    order = "2 in delta, lam, detuning and beta a^2 for a transient; a steady state to O(beta^2 a^4), with bias O(a^3)"
+    valid = "delta, lam, detuning, beta a^2 << 1, and beta z0 a << 1 about an equilibrium z0; transients and slow beats"
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
-        """Constant forces, strong damping, every branch."""
+        """Strong damping, soft oscillators, too many of them, every branch."""
         if start is Start.ALL:
             return "it follows one way in, not every branch; use rung harmonic_balance"
         if setting.n > MOST:
@@ -45,46 +48,33 @@ class EnvelopeRung(Rung):
         """What is reached from rest or by a ramp; an answer whose estimate is above `tol` is out of budget."""
         began = time.perf_counter()
         arrival = reached(chain, setting, start=start)
-        flow = SlowFlow.of(chain, setting, setting.lam, ORDER)
         ok = arrival.outcome == Outcome.OK
+        harmonics, mean = _series(chain, setting, arrival)
+        stages = Stages.of(chain, setting)
+        basis = basis_for(3, stages.has_mean)
+        x = basis.coordinates(harmonics.transpose(1, 2, 0), mean.T).transpose(1, 0, 2) * stages.length
         estimate = np.full(len(setting), np.inf)
         if ok.any():
-            # The whole effect of the third harmonic, which is in: a bound of what the fifth can do.
-            effect = effect_of_third(flow, np.where(ok[:, None], arrival.phasor, 0))
-            rounding = ROUNDING * setting.n * (1 + 1 / np.maximum(chain.deltas.min() * setting.omega, 1e-12))
-            estimate[ok] = (effect + rounding)[ok]
+            estimate[ok] = defect(stages.pick(ok), basis, x[:, :, ok])
         outcome = arrival.outcome.copy()
         outcome[ok & ~(estimate <= tol)] = Outcome.OUT_OF_BUDGET
-        harmonics = np.zeros((len(setting), 3, setting.n), dtype=np.complex128)
-        harmonics[:, 0] = arrival.phasor
-        harmonics[:, 2] = _third(flow, arrival.phasor)
-        mean = np.where(ok[:, None], 0.0, np.full(arrival.phasor.shape, np.nan))
         multipliers = np.exp(arrival.rates * setting.period[:, None]).reshape(len(setting), setting.n, 2)
-        branch = _branch(chain, setting, flow, arrival)
+        branch = np.ascontiguousarray(branches_of(stages, basis, x).T)
         for array in (outcome, harmonics, mean, multipliers, branch, estimate, ok):
             array.flags.writeable = False
         stats = replace(arrival.stats, oscillators_solved=len(setting) * setting.n, seconds=time.perf_counter() - began)
         return Response(self.name, outcome, harmonics, mean, ok, ok, multipliers, branch, estimate, stats)
 
 
-def _third(flow: SlowFlow, amplitude: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Third harmonics, each also driven by the one before it."""
-    own = flow.third * amplitude**3
-    passed: NDArray[np.complex128] = own + flow.lam * np.roll(own, 1, axis=1) / (flow.stiff - 8 * flow.omega**2)
-    return passed
-
-
-def _branch(chain: Chain, setting: Setting, flow: SlowFlow, arrival: Arrival) -> NDArray[np.int8]:
-    """Each oscillator's place among the roots of its cubic: low before the first fold, high past the second."""
-    branch = np.zeros(arrival.phasor.shape, dtype=np.int8)
-    if not chain.betas.any():
-        return branch
-    force = setting.lam * np.roll(arrival.phasor, 1, axis=1)
-    force[:, 0] += setting.epsilon * np.exp(1j * setting.phase)
-    beta = np.broadcast_to(chain.betas, (setting.n,))
-    for m in range(setting.n):
-        cubic = Cubic.of(flow.stiff[:, m].real, flow.stiff[:, m].imag, beta[m : m + 1], force[:, m])
-        v = cubic.measure(arrival.phasor[:, m])
-        branch[:, m] = np.where(v < cubic.peak, Branch.LOW, np.where(v > cubic.dip, Branch.HIGH, Branch.MIDDLE))
-        branch[~cubic.multiple, m] = Branch.LOW
-    return branch
+def _series(chain: Chain, setting: Setting, arrival: Arrival) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Harmonics (N, 3, n) and means (N, n) that go with the amplitudes reached."""
+    flow = SlowFlow.of(chain, setting, setting.lam, ORDER)
+    mean, second, third = flow.harmonics(arrival.phasor)
+    # A third harmonic is also driven by those of the oscillators that feed it.
+    each = np.arange(setting.n)
+    links = -flow.stiff
+    links[:, each, each] = 0
+    third = third - flow.third * times(links, third)
+    if flow.lean is not None:
+        mean = mean + flow.lean.place
+    return np.stack([arrival.phasor, second, third], axis=1), np.where(np.isfinite(arrival.phasor), mean, np.nan)

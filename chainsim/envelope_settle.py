@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chain import Chain, Setting
-from .envelope import EnvelopeError, hilltop, slow_refusal
-from .envelope_flow import SlowFlow, Steps, fixed_point, pick, rates_at
+from .envelope import EnvelopeError, slow_refusal
+from .envelope_fixed import NEWTON_STEPS, fixed_point, rates_at
+from .envelope_run import FINE, LOOK, Run
 from .response import Outcome, Stats
 from .rung import Start
 
@@ -20,22 +21,19 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Lanes = NDArray[np.int64]
 
-ORDER = 2
-# Phase of the fastest slow rate in one step: the steps only have to find the basin, Newton finds the steady state.
-STEP = 0.4
-LOOK = 4.0  # Time between two looks, in units of 1/delta: two e-folds.
-NEAR = 1e-3  # Distance from a fixed point, relative to each oscillator, at which its linearised flow decides.
+NEAR = 1e-3  # Distance from a fixed point, relative to each setting, at which its linearised flow decides.
+QUIET = 0.05  # Change between two looks, relative, above which looking for a fixed point is idle.
 SAME = 1e-6  # Two fixed points found one after the other are one.
 CLOSE = 1e-4  # Distance within which it need not shrink any more: the slaving's own error is below it.
 SHRINKS = 0.98  # A decaying distance falls by more between two looks.
 MOVES = 1e-5  # Change between two looks, relative, that is motion and not the tail of a decay.
-MOST_STEPS = 8000  # Steps between two looks; a setting that needs more is out of budget at once.
-LOOKS = 160  # Looks after which a setting is out of budget.
-BEATS = 8  # Looks over which a beat is measured,
+LOOKS = 320  # Looks after which a setting is out of budget.
+BEATS = 16  # Looks over which a beat is measured,
 WINDOWS = 5  # at most so often,
 STEADY = 3e-3  # until its frequency (relative) and its depth change less than this.
-QUIET = 1e-4  # Depth below which a beat is none.
-RAMP = 100.0  # Length of the ramp, in units of 1/delta.
+STRONGEST = 2.0  # beta a^2 beyond which the slow flow is not true of a hardening chain.
+BOUND = 1e150  # An amplitude beyond which a motion without a hilltop has run away.
+QUIETEST = 1e-4  # Depth below which a beat is none.
 
 
 @dataclass(frozen=True)
@@ -67,8 +65,8 @@ def reached(chain: Chain, setting: Setting, *, start: Start | ArrayLike) -> Arri
 
     Parameters
     ----------
-    start : ``rest`` (sudden drive), ``ramp`` (drive raised linearly within 100/delta), or amplitudes, complex128, shape
-        (n,) or (N, n).
+    start : ``rest`` (sudden forces), ``ramp`` (drive raised linearly within 100/delta, constant forces already there),
+        or amplitudes, complex128, shape (n,) or (N, n).
 
     Raises
     ------
@@ -82,71 +80,48 @@ def reached(chain: Chain, setting: Setting, *, start: Start | ArrayLike) -> Arri
     if refusal:
         raise EnvelopeError(refusal)
     with np.errstate(all="ignore"):
-        run = _Run(chain, setting)
-        run.begin(start)
+        run = _Settling(chain, setting)
+        run.way.begin(start)
         run.settle()
         return run.arrival(time.perf_counter() - began)
 
 
-class _Run:
+class _Settling:
     """One call of `reached`; arrays have the leading axis N."""
 
     def __init__(self, chain: Chain, setting: Setting) -> None:
         size, n = len(setting), setting.n
-        self.flow = SlowFlow.of(chain, setting, setting.lam, ORDER)
-        self.drive = setting.epsilon * np.exp(1j * setting.phase)
-        self.top = hilltop(chain, setting.lam)
-        fastest = np.abs(self.flow.rate) + np.abs(self.flow.weight) * np.abs(setting.lam) + _bend(chain, setting)
-        look = LOOK / float(chain.deltas.min())
-        needed = np.nan_to_num(np.ceil(look * fastest.max(axis=1) / STEP), nan=np.inf)
-        self.payable = np.flatnonzero(needed <= MOST_STEPS)
-        self.count = int(max(8, needed[self.payable].max(initial=0)))
-        self.h = look / self.count
-        self.steps = Steps.of(self.flow.rate, np.full((size, 1), self.h))
-        self.slow = np.zeros((size, n), dtype=np.complex128)
+        self.way = Run(chain, setting, FINE)
         self.outcome = np.empty(size, dtype=object)
         self.outcome.fill(Outcome.OUT_OF_BUDGET)
+        if self.way.flow.lean is not None:
+            self.outcome[~np.isfinite(self.way.flow.lean.place).all(axis=1)] = Outcome.ESCAPED
         self.phasor = np.full((size, n), np.nan, dtype=np.complex128)
         self.beat, self.spread = np.full(size, np.nan), np.full(size, np.nan)
         self.patience = int(np.ceil((20 + 4 * n) * 2 / LOOK))
-        self.evals = 0
-
-    def begin(self, start: Start | ArrayLike) -> None:
-        """Set the state at the first look."""
-        if isinstance(start, str):
-            if Start(start) is Start.ALL:
-                raise EnvelopeError("start: expected rest, ramp or amplitudes, got all; use rung harmonic_balance")
-            if Start(start) is Start.RAMP:
-                looks = int(RAMP / LOOK)
-                for k in range(looks):
-                    self._advance(self.payable, (k / looks, (k + 1) / looks))
-            else:
-                self.slow = self.flow.at_rest(self.drive, self.flow.lam)
-            return
-        amplitude = np.asarray(start, dtype=np.complex128)
-        if amplitude.shape not in (self.slow.shape, self.slow.shape[1:]) or not np.isfinite(amplitude).all():
-            raise EnvelopeError(f"start: expected finite amplitudes of shape {self.slow.shape}, got {amplitude.shape}")
-        self.slow = self.flow.slow_part(np.broadcast_to(amplitude, self.slow.shape), self.drive, self.flow.lam)
 
     def settle(self) -> None:
         """Look again and again until every setting has its outcome."""
-        lanes = self.payable
-        last, gap = np.full_like(self.phasor, np.nan), np.full(len(self.drive), np.inf)
+        way, lanes, size = self.way, self.way.payable, len(self.outcome)
+        last, gap = np.full_like(self.phasor, np.nan), np.full(size, np.inf)
         changes: list[Floats] = []
         for look in range(LOOKS):
             if not len(lanes):
                 return
-            before = self._amplitude(lanes)
-            self._advance(lanes, (1.0, 1.0))
-            here = self._amplitude(lanes)
-            seen = np.full(len(self.drive), np.inf)
+            before = way.amplitude(lanes)
+            way.advance(lanes)
+            here = way.amplitude(lanes)
+            seen = np.full(size, np.inf)
             seen[lanes] = _apart(before, here)
             changes.append(seen)
-            gone = ~(np.abs(here) <= self.top[lanes]).all(axis=1)
+            gone = ~(way.peak[lanes] <= np.minimum(way.top[lanes], BOUND)).all(axis=1)
             self.outcome[lanes[gone]] = Outcome.ESCAPED
+            # A cubic term as strong as the spring leaves nothing slow: no verdict.
+            gone |= way.spent[lanes] | (way.strength(lanes) > STRONGEST)
             lanes, here = lanes[~gone], here[~gone]
-            orbit, found = fixed_point(pick(self.flow, lanes), self.drive[lanes], here)
-            distance = np.where(found & self._stable(lanes, orbit), _apart(here, orbit), np.inf)
+            orbit, distance = self._orbits(lanes, here, (seen[lanes] < QUIET) | (look >= self.patience))
+            near = distance < QUIET
+            way.anchor(lanes[near], orbit[near])
             nearing = (_apart(last[lanes], orbit) < SAME) & (distance < np.maximum(SHRINKS * gap[lanes], CLOSE))
             done = nearing & (distance < NEAR)
             self.outcome[lanes[done]], self.phasor[lanes[done]] = Outcome.OK, orbit[done]
@@ -160,33 +135,21 @@ class _Run:
 
     def arrival(self, seconds: float) -> Arrival:
         """The result; arrays read-only."""
-        rates = rates_at(self.flow, self.phasor)
+        rates = rates_at(self.way.flow, self.phasor)
         for array in (self.outcome, self.phasor, rates, self.beat, self.spread):
             array.flags.writeable = False
-        return Arrival(
-            self.outcome, self.phasor, rates, self.beat, self.spread, Stats(rhs_evals=self.evals, seconds=seconds)
-        )
+        work = Stats(rhs_evals=self.way.evals, seconds=seconds)
+        return Arrival(self.outcome, self.phasor, rates, self.beat, self.spread, work)
 
-    def _amplitude(self, lanes: Lanes) -> Complexes:
-        flow = pick(self.flow, lanes)
-        return flow.amplitude(self.slow[lanes], self.drive[lanes], flow.lam)
-
-    def _advance(self, lanes: Lanes, ramp: tuple[float, float], keep: list[Complexes] | None = None) -> None:
-        """Move `lanes` from one look to the next while the drive goes from ramp[0] to ramp[1] of its value."""
-        flow, drive, slow = pick(self.flow, lanes), self.drive[lanes], self.slow[lanes]
-        steps = Steps(*(array[lanes] for array in vars(self.steps).values()))
-        for j in range(self.count):
-            u, v = (ramp[0] + (ramp[1] - ramp[0]) * (j + i) / self.count for i in (0, 1))
-            slow = steps.take(flow, slow, (u * drive, v * drive), (flow.lam, flow.lam))
-            if keep is not None:
-                keep.append(flow.amplitude(slow, drive, flow.lam))
-        self.slow[lanes] = slow
-        self.evals += 4 * self.count * slow.size
-
-    def _stable(self, lanes: Lanes, orbit: Complexes) -> NDArray[np.bool_]:
-        rates = rates_at(pick(self.flow, lanes), orbit)
-        stable: NDArray[np.bool_] = rates.real.max(axis=1) < 0
-        return stable
+    def _orbits(self, lanes: Lanes, here: Complexes, asked: NDArray[np.bool_]) -> tuple[Complexes, Floats]:
+        """The fixed points beside the amplitudes `here`, and how far they are: inf where none is stable or `asked`."""
+        orbit, distance = np.full_like(here, np.nan), np.full(len(lanes), np.inf)
+        if asked.any():
+            flow = self.way.flow.pick(lanes[asked])
+            found, known = fixed_point(flow, self.way.drive[lanes[asked]], here[asked], most=NEWTON_STEPS)
+            stable = known & (rates_at(flow, found).real.max(axis=1) < 0)
+            orbit[asked], distance[asked] = found, np.where(stable, _apart(here[asked], found), np.inf)
+        return orbit, distance
 
     def _recurrent(self, changes: list[Floats], lanes: Lanes, hope: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Whether the change between looks is real and does not fall: where a stable fixed point gives `hope`, not at
@@ -199,32 +162,38 @@ class _Run:
         moves: NDArray[np.bool_] = now > floor
         return moves
 
-    def _note_beats(self, lanes: Lanes) -> NDArray[np.bool_]:
+    def _note_beats(self, asked: Lanes) -> NDArray[np.bool_]:
         """Follow what does not lock until its strongest line stays what it is from one window to the next.
 
         Returns which of them do beat: a long wait at a fold that a stage has just passed looks like motion too.
         """
-        asked = lanes
-        for _ in range(WINDOWS):
-            if not len(lanes):
-                break
-            kept: list[Complexes] = []
-            for _ in range(BEATS):
-                self._advance(lanes, (1.0, 1.0), kept)
-            samples = np.stack(kept)
-            size = np.abs(samples)
-            spread = np.ptp(size, axis=0) / size.max(axis=0)
-            most = spread.argmax(axis=1)
-            deep = spread[np.arange(len(lanes)), most]
-            beat = np.array([strongest_line(samples[:, at, m], self.h) for at, m in enumerate(most)])
-            same = np.abs(beat - self.beat[lanes]) <= STEADY * np.abs(beat)
-            same &= np.abs(deep - self.spread[lanes]) <= STEADY
-            self.beat[lanes], self.spread[lanes] = beat, deep
-            lanes = lanes[~same & (deep > QUIET)]
-        beats = self.spread[asked] > QUIET
+        steps = self.way.steps
+        # Enough samples for the line to be seen, as many in every window.
+        steps[asked] = np.maximum(steps[asked], 16)
+        for count in np.unique(steps[asked]):
+            lanes = asked[steps[asked] == count]
+            for _ in range(WINDOWS):
+                if len(lanes):
+                    lanes = self._window(lanes)
+        beats = self.spread[asked] > QUIETEST
         self.outcome[asked[beats]] = Outcome.NOT_LOCKED
         self.beat[asked[~beats]] = self.spread[asked[~beats]] = np.nan
         return np.asarray(beats)
+
+    def _window(self, lanes: Lanes) -> Lanes:
+        """Measure the beats of `lanes` once more; returns those that are not yet what they were."""
+        samples = self.way.samples(lanes, BEATS)
+        h = self.way.look / float(self.way.steps[lanes[0]])
+        size = np.abs(samples)
+        spread = np.ptp(size, axis=0) / size.max(axis=0)
+        most = spread.argmax(axis=1)
+        deep = spread[np.arange(len(lanes)), most]
+        beat = np.array([strongest_line(samples[:, at, m], h) for at, m in enumerate(most)])
+        same = np.abs(beat - self.beat[lanes]) <= STEADY * np.abs(beat)
+        same &= np.abs(deep - self.spread[lanes]) <= STEADY
+        self.beat[lanes], self.spread[lanes] = beat, deep
+        again: Lanes = lanes[~same & (deep > QUIETEST)]
+        return again
 
 
 def strongest_line(samples: Complexes, h: float) -> float:
@@ -249,16 +218,3 @@ def _apart(a: Complexes, b: Complexes) -> Floats:
     size = np.maximum(np.abs(b).max(axis=1, initial=0.0), 1e-300)
     distance = np.abs(a - b).max(axis=1, initial=0.0) / size
     return np.where(np.isfinite(distance), distance, np.inf)
-
-
-def _bend(chain: Chain, setting: Setting) -> Floats:
-    """Bound of the rate the cubic term adds, shape (N, 1): 3/8 |beta| a^2/omega at the largest transient amplitude."""
-    delta, beta = float(chain.deltas.min()), float(np.abs(chain.betas).max())
-    strength = np.abs(setting.epsilon) / np.maximum(delta * setting.omega, 1e-9)
-    if beta:
-        # Past resonance the cubic itself holds the amplitude: 3/4 |beta| a^3 = 4 epsilon covers the overshoot.
-        strength = np.minimum(2 * strength, np.cbrt(16 * np.abs(setting.epsilon) / (3 * beta)) * 1.5)
-        strength = strength + np.sqrt(8 / 3 * np.abs(1 - setting.omega**2) / beta) * (strength > 0)
-        strength = np.minimum(strength, hilltop(chain, setting.lam).max(axis=1))
-    bound: Floats = (0.375 * beta * strength**2 / setting.omega)[:, None]
-    return bound

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .inlined import inlined
 
 __all__ = [
-    "BRANCH", "DEAD", "DONE", "ERROR", "FORCE", "LAM", "OM2", "RATE", "ROWS", "SIZE", "STIFF", "TRACE",
+    "BRANCH", "DEAD", "DECAY", "DONE", "ERROR", "FORCE", "LAM", "OM2", "RATE", "ROWS", "SIZE", "STIFF", "TRACE",
     "WIDTH", "WORK", "X", "correct", "finish", "start",
 ]  # fmt: skip
 
@@ -30,15 +30,17 @@ WIDTH = 16
 
 # Rows of a block. FORCE, X: harmonics 1, 3, 5. ERROR: bounds of the errors of harmonics 1, 3, 5, 7, handed down the
 # chain. SIZE: largest |a| of any oscillator so far, and the largest error. BRANCH: of the oscillator, then how many
-# answers it has.
-OM2, RATE, STIFF, LAM, FORCE, X, DONE, DEAD, ERROR, SIZE, BRANCH, TRACE, WORK, ROWS = (
-    WIDTH * row for row in (0, 1, 2, 3, 4, 10, 16, 17, 18, 22, 24, 26, 27, 40)
+# answers it has. DECAY: of half a turn.
+OM2, RATE, STIFF, LAM, FORCE, X, DONE, DEAD, ERROR, SIZE, BRANCH, TRACE, WORK, DECAY, ROWS = (
+    WIDTH * row for row in (0, 1, 2, 3, 4, 10, 16, 17, 18, 22, 24, 26, 27, 40, 41)
 )  # fmt: skip
 
 # Corrections end when one is this small, relative to the answer.
 _SMALL = 1e-9
 _ROUNDING = 4e-16
+# Steps towards the root of the cubic, and one, relative, after which Newton's method on the harmonics does better.
 _ROOT_STEPS = 6
+_NEAR = 1e-3
 # High word of the double whose bits, added to a third of those of c, give the cube root of c to 6 %.
 _CUBE_ROOT = 715_094_163 << 32
 
@@ -56,7 +58,7 @@ def start(block: Floats, sign: float) -> None:
     a parabola through the last point is solved, which holds at the fold too. Right of it Newton's method comes from
     an upper bound. Rows BRANCH receive the first fold (0: none) and the number of roots.
     """
-    work = block[WORK : WORK + 4 * WIDTH]
+    work = block[WORK : WORK + 6 * WIDTH]
     for w in range(WIDTH):
         fr, fi = block[FORCE + w], block[FORCE + WIDTH + w]
         work[w] = 0.75 * (fr * fr + fi * fi)
@@ -74,18 +76,34 @@ def start(block: Floats, sign: float) -> None:
         left = bend > 0 and c <= peak * ((kappa + sign * peak) ** 2 + gg)
         tame = cube if cube * linear <= c else c / linear
         v = 0.0 if left else (abs(kappa) + cube if bend > 0 else tame)
-        top = peak if left else math.inf
-        for _ in range(_ROOT_STEPS):
-            stiff = kappa + sign * v
-            slope = stiff * (stiff + 2 * sign * v) + gg
-            rest = c - v * (stiff * stiff + gg)
-            bent = math.sqrt(max(slope * slope + 4 * rest * (2 * sign * kappa + 3 * v), 0.0))
-            step = 2 * rest / (slope + (bent if left else slope))
-            v = min(v + step, top) if step * step >= 0 else v
         block[BRANCH + w] = peak if folded else 0.0
         block[BRANCH + WIDTH + w] = 3.0 if folded and left and c >= dip * ((kappa + sign * dip) ** 2 + gg) else 1.0
         work[2 * WIDTH + w], work[3 * WIDTH + w] = v, dip
+        # The highest root that is looked for, and whether the search goes on.
+        work[4 * WIDTH + w], work[5 * WIDTH + w] = peak if left else math.inf, 1.0
+    for _ in range(_ROOT_STEPS):
+        if _towards_root(block, work, sign) == 0:
+            break
     _slaved(block, sign)
+
+
+@inlined
+def _towards_root(block: Floats, work: Floats, sign: float) -> int:
+    """One step towards the root of every setting that needs it; returns how many still do."""
+    moving = 0
+    for w in range(WIDTH):
+        g, c, v, top, go = block[RATE + w], work[w], work[2 * WIDTH + w], work[4 * WIDTH + w], work[5 * WIDTH + w]
+        kappa = block[STIFF + w] - block[OM2 + w]
+        gg, stiff = g * g, kappa + sign * v
+        slope = stiff * (stiff + 2 * sign * v) + gg
+        rest = c - v * (stiff * stiff + gg)
+        bent = math.sqrt(max(slope * slope + 4 * rest * (2 * sign * kappa + 3 * v), 0.0))
+        step = go * (2 * rest / (slope + (bent if top < math.inf else slope)))
+        v = min(v + step, top) if step * step >= 0 else v
+        still = 0.0 if abs(step) <= _NEAR * v else go
+        work[2 * WIDTH + w], work[5 * WIDTH + w] = v, still
+        moving += 1 if still > 0 else 0
+    return moving
 
 
 @inlined

@@ -12,6 +12,7 @@ from .compiled import compiled
 from .fast_balance import (
     BRANCH,
     DEAD,
+    DECAY,
     DONE,
     ERROR,
     FORCE,
@@ -31,14 +32,14 @@ from .fast_balance import (
 from .fast_floquet import half_traces
 from .inlined import inlined
 
-__all__ = ["Found", "Given", "larger", "march_blocks", "write_multipliers"]
+__all__ = ["SAFETY", "Found", "Given", "larger", "march_blocks", "solve_block", "store", "write_multipliers"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 _MOST_CORRECTIONS = 12
-# One Newton step measures the left-out harmonic to first order; twice it covers the rest.
-_SAFETY = 2.0
+SAFETY = 2.0
+"""One Newton step measures the left-out harmonic to first order; twice it covers the rest."""
 
 
 class Given(NamedTuple):
@@ -97,6 +98,7 @@ def _load(block: Floats, given: Given, first: int, last: int) -> None:
         i = min(first + w, last - 1)
         omega = given.omega[i]
         block[OM2 + w], block[RATE + w] = omega * omega, given.delta * omega
+        block[DECAY + w] = math.exp(-math.pi * given.delta / omega)
         block[DEAD + w] = block[SIZE + w] = block[SIZE + WIDTH + w] = 0.0
         for row in range(4):
             block[ERROR + row * WIDTH + w] = 0.0
@@ -124,19 +126,31 @@ def _next(block: Floats, given: Given, first: int, last: int, m: int) -> None:
 
 
 @inlined
-def _store(block: Floats, given: Given, found: Found, first: int, last: int, m: int) -> None:
+def store(block: Floats, w: int, given: Given, found: Found, i: int, m: int) -> None:
+    """Write what lane w of a block holds as oscillator m of setting i."""
     back = 1.0 / given.length
-    for w in range(min(WIDTH, last - first)):
-        i = first + w
-        found.phasor[i, m] = complex(block[X + w] * back, block[X + WIDTH + w] * back)
-        found.third[i, m] = complex(block[X + 2 * WIDTH + w] * back, block[X + 3 * WIDTH + w] * back)
-        found.branch[i, m] = np.int8(block[BRANCH + w])
-        found.answers[i, m] = np.int8(block[BRANCH + WIDTH + w])
-        decay = math.exp(-math.pi * given.delta / given.omega[i])
-        modulus = write_multipliers(found.multipliers[i, m], block[TRACE + w], decay)
-        found.largest[i] = larger(found.largest[i], modulus)
-        if block[DEAD + w] > 0:
-            found.estimate[i] = math.nan
+    found.phasor[i, m] = complex(block[X + w] * back, block[X + WIDTH + w] * back)
+    found.third[i, m] = complex(block[X + 2 * WIDTH + w] * back, block[X + 3 * WIDTH + w] * back)
+    found.branch[i, m] = np.int8(block[BRANCH + w])
+    found.answers[i, m] = np.int8(block[BRANCH + WIDTH + w])
+    modulus = write_multipliers(found.multipliers[i, m], block[TRACE + w], block[DECAY + w])
+    found.largest[i] = larger(found.largest[i], modulus)
+    if block[DEAD + w] > 0:
+        found.estimate[i] = math.nan
+
+
+@inlined
+def solve_block(block: Floats, table: Floats, quarter: float, sign: float) -> None:
+    """One oscillator of every lane under the forces in the block; a lane without an answer is marked dead."""
+    start(block, sign)
+    for _ in range(_MOST_CORRECTIONS):
+        if correct(block, sign) == 0:
+            break
+    for w in range(WIDTH):
+        if block[DONE + w] == 0.0:
+            block[DEAD + w] = 1.0
+    finish(block, sign)
+    half_traces(block, table, quarter, sign)
 
 
 @compiled
@@ -156,16 +170,9 @@ def march_blocks(given: Given, found: Found, table: Floats, first: int, last: in
         found.estimate[at:end] = 0.0
         for m in range(given.lam.shape[1]):
             _next(block, given, at, end, m)
-            start(block, given.sign)
-            for _ in range(_MOST_CORRECTIONS):
-                if correct(block, given.sign) == 0:
-                    break
-            for w in range(WIDTH):
-                if block[DONE + w] == 0.0:
-                    block[DEAD + w] = 1.0
-            finish(block, given.sign)
-            half_traces(block, table, quarter, given.sign)
-            _store(block, given, found, at, end, m)
+            solve_block(block, table, quarter, given.sign)
+            for w in range(end - at):
+                store(block, w, given, found, at + w, m)
         for w in range(end - at):
             if block[SIZE + w] > 0:
-                found.estimate[at + w] += _SAFETY * block[SIZE + WIDTH + w] / block[SIZE + w]
+                found.estimate[at + w] += SAFETY * block[SIZE + WIDTH + w] / block[SIZE + w]

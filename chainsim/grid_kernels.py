@@ -8,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .splitting import FLOWS, KICK_TIMES, KICKS, WIDTH, flow
+from .inlined import inlined
+from .splitting import FLOWS, KICK_TIMES, KICKS, flow
 
-__all__ = ["Actuators", "Chains", "Stretch", "advance_chains", "advance_unequal"]
+__all__ = ["WIDTH", "Actuators", "Chains", "Stretch", "advance_chains", "advance_unequal"]
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
+
+WIDTH = 16
+"""Chains side by side; a caller should hand over a multiple."""
 
 # One actuator's share of the workspace, in runs of WIDTH numbers: q, p, force and lam at the last sample,
 # their changes to the next, and a run of padding against cache-set conflicts.
@@ -23,7 +27,7 @@ _TILE = 64
 """Samples all blocks go through before the next ones, so that a large grid's samples stay in the cache."""
 
 
-@compiled
+@inlined
 def _kick_row(row: Floats, previous: Floats, at: float, c: float, s: float, d: float, b: float, beta: float) -> None:
     # Slices with constant offsets, as in splitting: the form the compiler vectorises.
     for w in range(WIDTH):
@@ -35,7 +39,7 @@ def _kick_row(row: Floats, previous: Floats, at: float, c: float, s: float, d: f
         row[WIDTH + w] = c * y - d * x
 
 
-@compiled
+@inlined
 def _flow_row(row: Floats, c: float, s: float, d: float) -> None:
     for w in range(WIDTH):
         x, y = row[w], row[WIDTH + w]
@@ -63,7 +67,7 @@ class Stretch(NamedTuple):
     done: int
 
 
-@compiled
+@inlined
 def _one_sample(work: Floats, flows: Floats, system: Chains) -> None:
     """Move one block from a sample to the next; force and lam are linear between them."""
     last, h = len(work) - _ROW, system.dtau / system.substeps
@@ -83,7 +87,7 @@ def _one_sample(work: Floats, flows: Floats, system: Chains) -> None:
                 )  # fmt: skip
 
 
-@compiled
+@inlined
 def _aim(work: Floats, start: int, force: Floats, lam: Floats) -> None:
     """Take the next sample's forces and links as changes from the present ones."""
     for at in range(force.shape[1]):
@@ -93,7 +97,7 @@ def _aim(work: Floats, start: int, force: Floats, lam: Floats) -> None:
             row[5 * WIDTH + w] = lam[start + w, at] - row[3 * WIDTH + w]
 
 
-@compiled
+@inlined
 def _arrive(work: Floats, start: int, force: Floats, lam: Floats) -> None:
     """Make the next sample's forces and links the present ones, without the round-off of their changes."""
     for at in range(force.shape[1]):
@@ -102,7 +106,7 @@ def _arrive(work: Floats, start: int, force: Floats, lam: Floats) -> None:
             row[2 * WIDTH + w], row[3 * WIDTH + w] = force[start + w, at], lam[start + w, at]
 
 
-@compiled
+@inlined
 def _store(work: Floats, start: int, limit: float, sample: int, z: Floats, held: Floats, escaped: Whole) -> None:
     """Write one sample of positions; a chain that passes `limit` keeps the positions it had before."""
     n = z.shape[1]
@@ -121,7 +125,7 @@ def _store(work: Floats, start: int, limit: float, sample: int, z: Floats, held:
             z[chain, at] = held[chain, at]
 
 
-@compiled
+@inlined
 def _exchange(work: Floats, start: int, state: Floats, out: bool) -> None:
     """Copy the four parts of the state of a block's chains into the workspace, or out of it."""
     for part in range(4):
@@ -171,7 +175,7 @@ _OWN = 13 * WIDTH
 """One actuator's coefficients, in runs of WIDTH: four distinct flows of three each, and beta."""
 
 
-@compiled
+@inlined
 def _kick_own(row: Floats, previous: Floats, own: Floats, at: float, flow_at: int, b: float) -> None:
     for w in range(WIDTH):
         x = row[w]
@@ -183,7 +187,7 @@ def _kick_own(row: Floats, previous: Floats, own: Floats, at: float, flow_at: in
         row[WIDTH + w] = c * y - own[flow_at + 2 * WIDTH + w] * x
 
 
-@compiled
+@inlined
 def _flow_own(row: Floats, own: Floats) -> None:
     for w in range(WIDTH):
         x, y, c = row[w], row[WIDTH + w], own[w]
@@ -191,7 +195,7 @@ def _flow_own(row: Floats, own: Floats) -> None:
         row[WIDTH + w] = c * y - own[2 * WIDTH + w] * x
 
 
-@compiled
+@inlined
 def _one_unequal_sample(work: Floats, own: Floats, system: Chains) -> None:
     """`_one_sample` where every actuator has coefficients of its own."""
     n, h = len(work) // _ROW - 1, system.dtau / system.substeps
@@ -213,7 +217,7 @@ def _one_unequal_sample(work: Floats, own: Floats, system: Chains) -> None:
                 )  # fmt: skip
 
 
-@compiled
+@inlined
 def _coefficients(actuators: Actuators, start: int, step: float, own: Floats) -> None:
     chains, n = actuators.delta.shape
     for m in range(n):

@@ -17,7 +17,7 @@ from .basis import Basis, resize
 from .march import March, branches_of, layer_of
 from .scaling import Stages
 
-__all__ = ["correct_joint", "follow_load", "newton_joint", "rounding_of"]
+__all__ = ["band_step", "correct_joint", "follow_load", "newton_joint", "rounding_of"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -27,8 +27,8 @@ SMALL_STEP = 1e-9
 MAX_STEPS = 20
 # Unknowns up to which the whole matrix is factored, many settings per call; beyond, a band for each setting.
 DENSE = 160
-# Following the load from 0: a step is taken when Newton moves its prediction by less than this, and is given up (a
-# fold) below the second number.
+# Following the load from 0: a step is taken when Newton moves its prediction by less than this altogether (by more, it
+# could be another branch), and is given up (a fold) below the second number.
 CLOSE = 0.15
 SHORTEST = 1e-4
 # Perturbation whose effect is the rounding error of an answer.
@@ -37,11 +37,10 @@ ROUNDING = 4e-16
 
 @dataclass(frozen=True)
 class _Solved:
-    """x : float64, shape (n, d, N). ok : bool, shape (N,). first : the first step over x. steps : summed up."""
+    """x : float64, shape (n, d, N). ok : bool, shape (N,). steps : summed up."""
 
     x: Floats
     ok: Bools
-    first: Floats
     steps: int
 
 
@@ -65,7 +64,9 @@ def follow_load(stages: Stages, basis: Basis) -> March:
         guess = _predict(here, basis, x[:, :, active], before[:, :, active], load[active], last[active], target)
         solved = _newton(here, basis, guess, target)
         count += solved.steps
-        good = solved.ok & (solved.first <= CLOSE)
+        with np.errstate(all="ignore"):
+            away, large = (np.abs(each).max(axis=(0, 1)) for each in (solved.x - guess, solved.x))
+        good = solved.ok & (away <= CLOSE * large)
         won, lost = active[good], active[~good]
         before[:, :, won], last[won] = x[:, :, won], load[won]
         x[:, :, won], load[won] = solved.x[:, :, good], target[good]
@@ -94,36 +95,41 @@ def correct_joint(stages: Stages, basis: Basis, x: Floats, old: Basis, load: Flo
     return _solve(stages, jacobian, right)
 
 
+def band_step(stages: Stages, basis: Basis, x: Floats, old: Basis, before: Floats | None) -> Floats:
+    """The same for one setting, always by a band; `before` (d, 1) acts on the first oscillator as well."""
+    jacobian, right = _equations(stages, basis, resize(x.transpose(1, 0, 2), old, basis).transpose(1, 0, 2), 1.0)
+    if before is not None:
+        right[0] += before
+    return _in_band(stages, jacobian[..., 0], right[..., 0], 0)[:, :, None]
+
+
 def rounding_of(stages: Stages, basis: Basis, x: Floats) -> Floats:
     """What rounding of the equations does to x, relative to its largest coordinate; float64, shape (N,)."""
     jacobian, _ = _equations(stages, basis, x, 1.0)
     signs = np.where(np.arange(stages.n * basis.size) * 0.6180339887 % 1 < 0.5, -1.0, 1.0).reshape(x.shape[:2])
     size = np.abs(x).max(axis=(0, 1))
-    moved = _solve(stages, jacobian, signs[:, :, None] * np.abs(jacobian).max(axis=(1, 2))[:, None] * size)
-    with np.errstate(all="ignore"):
-        relative: Floats = ROUNDING * (1 + np.abs(moved).max(axis=(0, 1)) / size)
-    return np.where(size > 0, relative, ROUNDING)
+    moved = _solve(stages, jacobian, signs[:, :, None] * np.abs(jacobian).max(axis=(1, 2))[:, None])
+    relative: Floats = ROUNDING * (1 + np.abs(moved).max(axis=(0, 1)))
+    return np.where(size == 0, ROUNDING, relative)
 
 
 def _newton(stages: Stages, basis: Basis, guess: Floats, load: Floats) -> _Solved:
     size = guess.shape[2]
-    x, ok, first, count = guess.copy(), np.zeros(size, dtype=bool), np.full(size, np.inf), 0
+    x, ok, count = guess.copy(), np.zeros(size, dtype=bool), 0
     active = np.arange(size)
-    for turn in range(MAX_STEPS):
+    for _ in range(MAX_STEPS):
         here = x[:, :, active]
         moved = correct_joint(stages.pick(active), basis, here, basis, load[active])
         count += len(active) * stages.n
         with np.errstate(all="ignore"):
             length, large = np.abs(moved - here).max(axis=(0, 1)), np.abs(moved).max(axis=(0, 1))
-            if turn == 0:
-                first = np.where(large > 0, length / large, 0.0)
             settled = length <= SMALL_STEP * large
         x[:, :, active] = moved
         ok[active] = settled
         active = active[~settled & np.isfinite(large)]
         if not len(active):
             break
-    return _Solved(x, ok, first, count)
+    return _Solved(x, ok, count)
 
 
 def _equations(stages: Stages, basis: Basis, x: Floats, load: Floats | float) -> tuple[Floats, Floats]:

@@ -12,15 +12,20 @@ from .answer import Answer, response_of, stitch
 from .basis import basis_for
 from .chain import Chain, Setting
 from .harmonic_balance import balance_near
+from .long import LONG, low_alone
 from .response import Outcome, Response, Stats
 from .rest import sure_from_rest
-from .rung import Start, load_rung
+from .rung import MAX_PERIODS, Start, load_rung
 from .scaling import Stages
 
 __all__ = ["solve"]
 
-# Relative distance at which the answer of harmonic balance is the orbit that was integrated (known to 1e-5).
+# Distance, relative to each oscillator, at which the answer of harmonic balance is the orbit that was integrated (known
+# to 1e-5). Two orbits may differ in the far end of a chain alone; FAINT of the largest oscillator nothing is seen.
 SAME_ORBIT = 1e-2
+FAINT = 1e-8
+# Of the hilltop, for a mean: a sudden force swings to twice as far and more, and at 0.2955 it throws it over.
+THROWN = 0.25
 
 
 def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
@@ -32,7 +37,8 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
     rung : a name in `RUNGS`, or ``auto``: the cheapest rung whose error estimate meets `tol`.
     start : ``rest``, a sudden drive from z = z' = 0. ``auto`` says which answer is reached and whether the motion
         escapes or does not lock, integrating where that is not plain; a steady rung by name gives the lower branch.
-        ``ramp``, the drive raised slowly from 0: the lower branch, `NO_CONVERGENCE` past its fold.
+        ``ramp``, the drive raised slowly from 0: the lower branch; past its fold, where ``auto`` and ``ode`` find
+        that a drive raised within 100/delta ends (other rungs: `NO_CONVERGENCE`).
         ``all``, every branch of one setting, along the batch axis, the lowest first.
 
     Raises
@@ -59,7 +65,11 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         name = "harmonic_balance" if setting.epsilon.any() else "static"
         return load_rung(name).solve(chain, setting, tol=tol, start=way)
     steady = _cheapest(chain, setting, tol, way)
-    return _from_rest(chain, setting, tol, steady) if way is Start.REST else steady
+    if way is Start.REST:
+        return _from_rest(chain, setting, tol, steady)
+    from .envelope_ramp import from_ramp
+
+    return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
 
 
 def _linear(chain: Chain, setting: Setting, tol: float, start: Start) -> Response:
@@ -103,9 +113,13 @@ def _candidates(chain: Chain, setting: Setting, tol: float) -> tuple[str, ...]:
 
 def _from_rest(chain: Chain, setting: Setting, tol: float, steady: Response) -> Response:
     """`steady` where it is surely reached from rest, and what an integration says elsewhere."""
-    sure = sure_from_rest(chain, setting, steady) & (steady.outcome == Outcome.OK)
+    sure = _sure(chain, setting, steady) & (steady.outcome == Outcome.OK)
     if sure.all():
         return steady
+    if chain.n > LONG:
+        # An integration of it is beyond any budget.
+        outcome = np.where(sure, steady.outcome, np.array(Outcome.OUT_OF_BUDGET, dtype=object))
+        return replace(steady, outcome=outcome)
     asked = np.flatnonzero(~sure)
     parts = [(asked[index], part) for index, part in _integrated(chain, setting[asked], tol)]
     if sure.any():
@@ -115,11 +129,32 @@ def _from_rest(chain: Chain, setting: Setting, tol: float, steady: Response) -> 
     return replace(whole, stats=whole.stats + (steady.stats if not sure.any() else Stats()))
 
 
+def _sure(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]:
+    """`sure_from_rest`, and for a long chain a bound whose cost is in proportion to its length."""
+    if chain.n <= LONG:
+        return sure_from_rest(chain, setting, steady) & _held(chain, setting, steady)
+    sure = np.zeros(len(setting), dtype=bool)
+    if not chain.feed_forward or chain.rows > 1 or setting.preload.any() or setting.bias.any():
+        return sure
+    for index in np.flatnonzero(steady.stable):
+        stages = Stages.of(chain, setting[index : index + 1])
+        with np.errstate(all="ignore"):
+            sure[index] = low_alone(stages, steady.phasor[index] * stages.length)
+    return sure
+
+
+def _held(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]:
+    """Whether constant forces that set in suddenly cannot throw an oscillator out of its well; bool, shape (N,)."""
+    stages = Stages.of(chain, setting)
+    top = np.sqrt(np.maximum(stages.k, 0.0) / np.maximum(-stages.sign, 1e-300))
+    return np.asarray((np.abs(steady.mean.T) * stages.length <= THROWN * top).all(axis=0))
+
+
 def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArray[np.intp], Response]]:
     """What is reached from rest: integrated until sure, then refined by harmonic balance beside that orbit."""
-    from .ode import OdeRung, reached_from_rest, steady_from_rest
+    from .ode import reached_from_rest, steady_from_rest
 
-    reached = reached_from_rest(chain, setting, max_periods=OdeRung.max_periods)
+    reached = reached_from_rest(chain, setting, max_periods=MAX_PERIODS)
     ok = reached.outcome == Outcome.OK
     parts: list[tuple[NDArray[np.intp], Response]] = []
     if not ok.all():
@@ -130,14 +165,16 @@ def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArra
         phasor = reached.phasor[found]
         near = balance_near(chain, setting[found], phasor, tol=tol)
         with np.errstate(invalid="ignore"):
-            size = np.maximum(np.abs(phasor).max(axis=1), np.abs(near.mean).max(axis=1))
-            same = np.abs(near.phasor - phasor).max(axis=1) <= SAME_ORBIT * size
+            size = np.abs(phasor)
+            size = np.maximum(size, FAINT * size.max(axis=1, keepdims=True))
+            # Without a drive first harmonics tell nothing.
+            same = (np.abs(near.phasor - phasor) <= SAME_ORBIT * size).all(axis=1) & (size > 0).all(axis=1)
         good = (near.outcome == Outcome.OK) & same
         if good.any():
             parts.append((found[good], _subset(near, good)))
         if not good.all():
             rest = found[~good]
-            parts.append((rest, steady_from_rest(chain, setting[rest], tol=tol, max_periods=OdeRung.max_periods)))
+            parts.append((rest, steady_from_rest(chain, setting[rest], tol=tol, max_periods=MAX_PERIODS)))
     first, part = parts[0]
     parts[0] = (first, replace(part, stats=part.stats + reached.stats))
     return parts

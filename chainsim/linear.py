@@ -12,10 +12,12 @@ from .answer import Answer, defect, outcomes, response_of
 from .basis import Basis, basis_for
 from .chain import Chain, Setting
 from .joint import correct_joint, rounding_of
+from .long import is_long
 from .monodromy import rest_multipliers
 from .response import Outcome, Response, Stats
 from .rung import Rung, Start
 from .scaling import Stages
+from .single import linear_alone
 
 __all__ = ["LinearRung"]
 
@@ -43,14 +45,18 @@ class LinearRung(Rung):
         if stages.joint:
             x = correct_joint(straight, basis, np.zeros((stages.n, basis.size, len(stages))), basis)
         else:
-            x = _forward(straight, basis)
+            x = linear_alone(straight, basis.mean) if is_long(stages) else _forward(straight, basis)
         finite = np.isfinite(x).all(axis=(0, 1))
         multipliers = rest_multipliers(stages) if stages.joint else _open_multipliers(stages)
         outcome = outcomes(len(stages), Outcome.OK)
         outcome[~finite] = Outcome.ESCAPED if stages.linear else Outcome.NO_CONVERGENCE
         if stages.linear:
             outcome[(np.abs(multipliers) > 1).any(axis=(1, 2))] = Outcome.ESCAPED
-        estimate = rounding_of(stages, basis, x) if stages.linear and stages.joint else defect(stages, basis, x)
+        if stages.linear and stages.joint:
+            size = np.abs(x).max(axis=(0, 1))
+            estimate = rounding_of(stages, basis, x / np.where(size > 0, size, 1.0))
+        else:
+            estimate = defect(stages, basis, x)
         answer = Answer(basis, x, outcome, np.zeros((stages.n, len(stages)), dtype=np.int8), estimate, multipliers)
         return response_of(stages, self.name, answer, Stats(oscillators_solved=stages.n * len(stages)), began)
 

@@ -106,7 +106,8 @@ def march(stages: Stages, basis: Basis, guide: Floats | None = None) -> March:
         if alone is not None:
             series, count = alone
             return March(basis, series, np.ones(1, dtype=bool), branches_of(stages, basis, series), count)
-    x = np.empty((stages.n, basis.size, len(stages)))
+    # Where a row of a grid begins the link from the end of the row before is 0, and what it multiplies must be finite.
+    x = np.zeros((stages.n, basis.size, len(stages)))
     ok = np.ones(len(stages), dtype=bool)
     branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
     steps, size, lanes = 0, len(stages), basis.size
@@ -125,7 +126,7 @@ def march(stages: Stages, basis: Basis, guide: Floats | None = None) -> March:
 
 def correct(stages: Stages, basis: Basis, x: Floats, old: Basis) -> Floats:
     """One Newton step of the whole chain in `basis` from x (n, d, N) in `old`; errors travel down the chain."""
-    moved = np.empty((stages.n, basis.size, len(stages)))
+    moved = np.zeros((stages.n, basis.size, len(stages)))
     for layer in stages.layers:
         osc = layer_of(stages, layer)
         here = resize(_side_by_side(x[layer]), old, basis)

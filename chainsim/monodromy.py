@@ -2,16 +2,18 @@
 
 About an orbit z the deviations obey ``x_m'' + delta_m x_m' + (k_m + 3 sign_m z_m^2) x_m = links``, a linear system of
 period 2 pi/omega. Its matrix over one period is a composition of exact flows of each oscillator alone and kicks by
-links and cubic terms, ABA(8,6,4) of Blanes, Casas, Farres, Laskar, Makazaga and Murua, Appl. Numer. Math. 68 (2013)
-58-72: n^2 operations a step, where a product of matrices takes n^3.
+links and cubic terms (`composition`): n^2 operations a step, where a product of matrices takes n^3.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .basis import Basis
+from .composition import FLOWS, KICK_TIMES, KICKS
 from .scaling import Stages
 
 __all__ = ["MOST_JOINT", "joint_multipliers", "rest_matrix", "rest_multipliers"]
@@ -28,13 +30,15 @@ MAX_STEPS = 8192
 # Numbers held at once for all settings of a block.
 CHUNK = 1_000_000
 
-_A = (0.0711334264982231177779387300061549964174, 0.241153427956640098736487795326289649618,
-      0.521411761772814789212136078067994229991, -0.333698616227678005726562603400438876027)  # fmt: skip
-_B = (0.183083687472197221961703757166430291072, 0.310782859898574869507522291054262796375,
-      -0.0265646185119588006972121379164987592663, 0.0653961422823734184559721793911134363710)  # fmt: skip
-FLOWS = (*_A, *_A[::-1])
-KICKS = (*_B, *_B[2::-1])
-KICK_TIMES = np.cumsum(FLOWS)[:7]
+# Where steps are too long or too many, multipliers come from the frozen system at so many points of the orbit.
+FROZEN = 64
+# Decay over a period from which on a multiplier is as good as 0.
+DEAD = 40.0
+MOST_GROWTH = 690.0
+# Rates per radian of the drive above which the orbit is slow beside them, and below which they see its mean.
+FAST, IDLE = 50.0, 0.02
+# Swings per radian of the drive from which on the frozen system is asked first: it costs less and errs less.
+MANY_SWINGS = 200.0
 
 
 def joint_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
@@ -48,15 +52,61 @@ def joint_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
         return found.reshape(size, n, 2)
     # An odd series has z^2 of half the period: the monodromy is the square of that of half a turn.
     halves = 1 if basis.mean else 2
+    known = np.isfinite(x).all(axis=(0, 1))
+    many = _swings(stages, x) > MANY_SWINGS
+    _fill_frozen(found, stages, basis, x, known & many)
+    todo = np.flatnonzero(known & ~np.isfinite(found).all(axis=1))
     block = max(1, CHUNK // (4 * n * n))
-    for first in range(0, size, block):
-        part = np.arange(first, min(first + block, size))
+    for first in range(0, len(todo), block):
+        part = todo[first : first + block]
         matrices = _refined(stages.pick(part), basis, x[:, :, part], 2 * np.pi / halves)
         for j, matrix in zip(part, matrices, strict=True):
             if np.isfinite(matrix).all():
-                values = np.linalg.eigvals(matrix).astype(np.complex128) ** halves
-                found[j] = values[np.argsort(-np.abs(values), kind="stable")]
+                found[j] = _largest_first(np.linalg.eigvals(matrix).astype(np.complex128) ** halves)
+    _fill_frozen(found, stages, basis, x, known & ~many & ~np.isfinite(found).all(axis=1))
     return found.reshape(size, n, 2)
+
+
+def _fill_frozen(found: Complexes, stages: Stages, basis: Basis, x: Floats, lanes: NDArray[np.bool_]) -> None:
+    for j in np.flatnonzero(lanes):
+        lane = np.array([j])
+        found[j] = _largest_first(_frozen(stages.pick(lane), basis, x[:, :, lane]))
+
+
+def _swings(stages: Stages, x: Floats) -> Floats:
+    """A bound of the fastest swing about the orbit, per radian of the drive; float64, shape (N,)."""
+    largest = np.abs(stages.k) + 3 * np.abs(stages.sign) * np.abs(x).sum(axis=1) ** 2
+    for _, source, link in stages.links():
+        largest[source] += np.abs(link)
+    fastest: Floats = np.sqrt(largest.max(axis=0)) / stages.omega
+    return fastest
+
+
+def _largest_first(values: Complexes) -> Complexes:
+    return values[np.argsort(-np.abs(values), kind="stable")]
+
+
+def _frozen(stages: Stages, basis: Basis, x: Floats) -> Complexes:
+    """Multipliers (2n,) of one setting as ``exp(mean over the orbit of the eigenvalues at rest in it)``; NaN if untrue.
+
+    True of rates far above the drive's, of rates so far below that only the mean counts, of those that hardly change
+    along the orbit, and of those so strongly damped that their multiplier is 0.
+    """
+    square = (basis.evaluate_at(2 * np.pi * (np.arange(FROZEN) + 0.5) / FROZEN) @ x[:, :, 0].T) ** 2
+    added = 3 * stages.of_each(stages.sign) * np.concatenate([square.mean(axis=0)[None], square])
+    many = stages.pick(np.zeros(FROZEN + 1, dtype=np.intp))
+    matrices = rest_matrix(replace(many, k=many.k + added.T))
+    if not np.isfinite(matrices).all():
+        return np.full(2 * stages.n, np.nan, dtype=np.complex128)
+    mean, *each = np.linalg.eigvals(matrices).astype(np.complex128)
+    moved = np.stack([values[np.abs(values - mean[:, None]).argmin(axis=1)] for values in each])
+    change = np.abs(moved - mean).max(axis=0)
+    slow = (np.abs(mean) >= FAST) | (np.abs(mean) <= IDLE) | (change <= 0.1 * np.abs(mean.real))
+    dead = 2 * np.pi * moved.real.max(axis=0) < -DEAD
+    apart = np.abs(mean[:, None] - mean) + np.where(np.eye(len(mean), dtype=bool), np.inf, 0.0)
+    alone = change <= 0.5 * apart.min(axis=1)
+    turned = _turned(2 * np.pi * moved.mean(axis=0))
+    return turned if (dead | (slow & alone)).all() else np.full_like(turned, np.nan)
 
 
 def rest_multipliers(stages: Stages) -> Complexes:
@@ -65,8 +115,13 @@ def rest_multipliers(stages: Stages) -> Complexes:
     if n > MOST_JOINT:
         return np.full((size, n, 2), np.nan, dtype=np.complex128)
     exponents = np.linalg.eigvals(rest_matrix(stages) * stages.omega[:, None, None]).astype(np.complex128)
-    turned: Complexes = np.exp(exponents * (2 * np.pi / stages.omega)[:, None])
-    return turned.reshape(size, n, 2)
+    return _turned(exponents * (2 * np.pi / stages.omega)[:, None]).reshape(size, n, 2)
+
+
+def _turned(exponents: Complexes) -> Complexes:
+    """exp, short of overflow: a multiplier of 10^300 is as unstable as a larger one."""
+    turned: Complexes = np.exp(np.minimum(exponents.real, MOST_GROWTH) + 1j * exponents.imag)
+    return turned
 
 
 def rest_matrix(stages: Stages) -> Floats:
@@ -85,10 +140,7 @@ def rest_matrix(stages: Stages) -> Floats:
 def _refined(stages: Stages, basis: Basis, x: Floats, span: float) -> Floats:
     """The monodromy over `span`, shape (N, 2n, 2n), the steps doubled until two agree; NaN where they never do."""
     found = np.full((len(stages), 2 * stages.n, 2 * stages.n), np.nan)
-    largest = np.abs(stages.k) + 3 * np.abs(stages.sign) * np.abs(x).sum(axis=1) ** 2
-    for _, source, link in stages.links():
-        largest[source] += np.abs(link)
-    turns = np.maximum(np.sqrt(largest.max(axis=0)) / stages.omega, max(0.5 * basis.order, 1.0)) * (span / np.pi)
+    turns = np.maximum(_swings(stages, x), max(0.5 * basis.order, 1.0)) * (span / np.pi)
     known = np.isfinite(turns) & (turns <= MAX_STEPS / 8)
     levels = 4 * 2 ** np.ceil(np.log2(np.where(known, turns, 1.0))).astype(np.intp)
     for level in np.unique(levels[known]):

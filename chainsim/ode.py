@@ -1,4 +1,4 @@
-"""The full equations: sudden drive from rest, integrated until sure, polished by shooting."""
+"""The full equations: a sudden drive from rest or a ramp, integrated until sure, polished by shooting."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from .chain import Chain, Setting
 from .march import classify
+from .ode_ramp import settle_ramp
 from .response import Branch, Outcome, Response, Stats
-from .rung import Rung, RungError, Start
+from .rung import MAX_PERIODS, Rung, RungError, Start
 from .scaled import Problem, scaled
 from .shooting import FAR_SMALLER, Orbits, shoot
 from .starts import Cubic
 from .transient import Settled, settle
 
-__all__ = ["OdeRung", "Reached", "reached_from_rest", "steady_from_rest"]
+__all__ = ["OdeRung", "Reached", "reached_from_rest", "steady_from_ramp", "steady_from_rest"]
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.int64]
@@ -83,13 +84,30 @@ def steady_from_rest(chain: Chain, setting: Setting, *, tol: float, max_periods:
     RungError
         When `tol` is below 1e-12 or not a number, or `max_periods` is below 1.
     """
+    _check(tol, max_periods)
+    began = time.perf_counter()
+    problem = scaled(chain, setting)
+    return _polished(problem, settle(problem, max_periods), tol, began)
+
+
+def steady_from_ramp(chain: Chain, setting: Setting, *, tol: float, max_periods: int) -> Response:
+    """The periodic steady states reached from equilibrium by a drive that grows linearly within 100/delta.
+
+    As `steady_from_rest`, but what does not lock is out of budget.
+    """
+    _check(tol, max_periods)
+    began = time.perf_counter()
+    return _polished(scaled(chain, setting), settle_ramp(chain, setting, max_periods=max_periods), tol, began)
+
+
+def _check(tol: float, max_periods: int) -> None:
     if not tol >= 1e-12:
         raise RungError(f"tol: expected a number >= 1e-12 (double precision gives no more), got {tol}")
     if max_periods < 1:
         raise RungError(f"max_periods: expected 1 or more, got {max_periods}")
-    began = time.perf_counter()
-    problem = scaled(chain, setting)
-    settled = settle(problem, max_periods)
+
+
+def _polished(problem: Problem, settled: Settled, tol: float, began: float) -> Response:
     polished = _Polished(problem, settled)
     polished.refine(tol)
     return polished.response(tol, began)
@@ -203,15 +221,15 @@ class OdeRung(Rung):
     order: ClassVar[str] = "tol (steps are doubled until the answer moves by less)"
     valid: ClassVar[str] = "always; a slow settling may exceed the budget of periods"
 
-    max_periods: ClassVar[int] = 60_000
-    """Drive periods after which a setting is out of budget: 75 e-folds at Q = 250."""
+    max_periods: ClassVar[int] = MAX_PERIODS
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
-        """A sudden drive from rest is all it integrates."""
-        if start is not Start.REST:
-            return f"it integrates from rest only, not start {start}; use start rest, or rung harmonic_balance"
+        """It goes one way in."""
+        if start is Start.ALL:
+            return f"it integrates one way in, not start {start}; use start rest or ramp, or rung harmonic_balance"
         return ""
 
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
-        """The steady states reached from rest, to `tol` or 1e-12, whichever is larger."""
-        return steady_from_rest(chain, setting, tol=max(tol, 1e-12), max_periods=self.max_periods)
+        """The steady states reached from rest or by a ramp, to `tol` or 1e-12, whichever is larger."""
+        way = steady_from_rest if start is Start.REST else steady_from_ramp
+        return way(chain, setting, tol=max(tol, 1e-12), max_periods=self.max_periods)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .network import Network, flows_of
-from .splitting import KICKS
+from .inlined import inlined
+from .network import Network
+from .splitting import FLOWS, KICKS, flow
 
 __all__ = ["HARMONICS", "map_joint", "shoot_forward"]
 
@@ -28,7 +29,14 @@ _CLOSE = 1e-14
 _NOTHING = 1e-290  # Corrections so small have lost their digits.
 
 
-@compiled
+@inlined
+def _flows(delta: float, stiffness: float, h: float, found: Floats) -> None:
+    """Coefficients of the eight flows of one step of length `h`, into (8, 3)."""
+    for k in range(8):
+        found[k, 0], found[k, 1], found[k, 2] = flow(delta, stiffness, FLOWS[k] * h)
+
+
+@inlined
 def _measure(samples: Floats, found: Complexes) -> None:
     """Mean and harmonics of one period of samples: z = found[0] + Re(sum found[k] e^{i k theta})."""
     steps = len(samples)
@@ -40,7 +48,7 @@ def _measure(samples: Floats, found: Complexes) -> None:
         found[k] = total / steps if k == 0 else 2 * total / steps
 
 
-@compiled
+@inlined
 def _one_period(
     start: Floats, h: float, flows: Floats, force: Floats, beta: float, seen: Floats, samples: Floats, end: Floats
 ) -> None:
@@ -69,7 +77,7 @@ def _one_period(
     end[0], end[1], end[2], end[3], end[4], end[5], end[6] = x, y, xx, xy, yx, yy, high
 
 
-@compiled
+@inlined
 def _newton(
     start: Floats, h: float, flows: Floats, force: Floats, beta: float, seen: Floats, samples: Floats, end: Floats
 ) -> tuple[float, int]:
@@ -95,7 +103,7 @@ def _newton(
     return np.nan, _ROUNDS
 
 
-@compiled
+@inlined
 def _forces(m: int, i: int, network: Network, table: Floats, seen: Floats, force: Floats) -> None:
     """Force on oscillator `m` of setting `i` at every kick; `seen` holds those before it, in turn."""
     depth = len(seen)
@@ -126,7 +134,7 @@ def shoot_forward(
     """
     n, steps = network.lam.shape[1], table.shape[0]
     force, seen = np.empty((steps, 7)), np.empty((max(1, abs(network.stride)) + 1, steps, 7))
-    samples, end, start = np.empty(steps), np.empty(7), np.empty(2)
+    samples, end, start, flows = np.empty(steps), np.empty(7), np.empty(2), np.empty((8, 3))
     for j in range(len(lanes)):
         i = lanes[j]
         h = network.period[i] / steps
@@ -135,7 +143,7 @@ def shoot_forward(
         for m in range(n):
             start[0], start[1] = state[j, m], state[j, n + m]
             _forces(m, i, network, table, seen, force)
-            flows = flows_of(network.delta[m], network.stiffness[i, m], h)
+            _flows(network.delta[m], network.stiffness[i, m], h, flows)
             here = seen[m % len(seen)]
             defect[j, m], done = _newton(start, h, flows, force, network.beta[m], here, samples, end)
             turns[j] += done
@@ -147,7 +155,7 @@ def shoot_forward(
             _measure(samples, harmonics[j, :, m])
 
 
-@compiled
+@inlined
 def _joint_step(y: Floats, dy: Floats, flows: Floats, h: float, network: Network, i: int, phases: Floats) -> None:
     """One step of setting `i`: `y` is (2, n), q and p; `dy` is (2, n, 2n), their tangent."""
     q, p, dq, dp = y[0], y[1], dy[0], dy[1]
@@ -190,7 +198,7 @@ def map_joint(
         h = network.period[i] / steps
         y, dy = state[j].copy().reshape(2, n), np.eye(2 * n).reshape(2, n, 2 * n)
         for m in range(n):
-            flows[m] = flows_of(network.delta[m], network.stiffness[i, m], h)
+            _flows(network.delta[m], network.stiffness[i, m], h, flows[m])
             high[j, m] = 0.0
         for s in range(steps):
             for m in range(n):

@@ -1,14 +1,16 @@
-"""Whether the lower answer is surely the one a sudden drive from rest reaches, without integrating."""
+"""Whether an answer is surely the one a sudden drive from rest reaches: by bounds, else by the envelope."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain, Setting
+from .chain import Chain, Setting, Spread
+from .envelope_decide import FEW, MOST_DECIDED, decide
 from .march import cubic_of, oscillator
 from .monodromy import MOST_JOINT, rest_matrix
 from .response import Response
+from .rung import Start
 from .scaling import Stages
 
 __all__ = ["sure_from_rest"]
@@ -22,29 +24,67 @@ WELL = 0.6
 FOLD = 0.6
 # How near, as a ratio of forces squared, the single-harmonic folds may be before "one answer" is doubted.
 NEAR = 1.25
+# Distance, relative to each oscillator, within which the slow flow's answer is the one in question.
+SAME = 0.05
 
 
 def sure_from_rest(chain: Chain, setting: Setting, response: Response) -> Bools:
     """Whether the steady `response` is the one reached from z = z' = 0; bool, shape (N,).
 
-    Sure means: the answer is stable, the peak of the start-up transient (bounded as if linear) stays well inside the
-    softening well, and every oscillator with more than one answer keeps well below its fold. A False is no verdict, it
-    asks for an integration.
+    Surely by bounds: the answer is stable, the peak of the start-up transient (bounded as if linear) stays well inside
+    the softening well, and every oscillator with more than one answer keeps well below its fold. Else the envelope
+    follows the chain as far as that is not so. A False is no verdict, it asks for an integration.
     """
     stages = Stages.of(chain, setting)
-    if stages.joint or chain.rows > 1:
-        with np.errstate(all="ignore"):
-            return response.stable & _contracting(stages, response)
+    sure: Bools
+    with np.errstate(all="ignore"):
+        if stages.joint or chain.rows > 1:
+            sure = response.stable & _contracting(stages, response)
+            depth = np.where(sure, 0, stages.n).astype(np.int64)
+        else:
+            depth = _depth(stages, response)
+            sure = np.asarray(response.stable & (depth == 0), dtype=np.bool_)
+    known = response.stable & np.isfinite(response.phasor).all(axis=1) & (np.abs(response.phasor) > 0).all(axis=1)
+    asked = ~sure & known & (depth <= MOST_DECIDED)
+    if np.count_nonzero(asked) <= FEW:
+        # Calls cost more than arithmetic: all are followed together, as far as the deepest.
+        depth[asked] = depth[asked].max(initial=0)
+    for count in np.unique(depth[asked]):
+        lanes = np.flatnonzero(asked & (depth == count))
+        sure[lanes] = _followed(chain, setting[lanes], int(count), response.phasor[lanes])
+    return sure
+
+
+def _depth(stages: Stages, response: Response) -> NDArray[np.int64]:
+    """How many oscillators from the head a chain has to the last that no bound decides; int64, shape (N,)."""
     size = np.abs(response.phasor.T) * stages.length
     mean = np.abs(response.mean.T) * stages.length
-    with np.errstate(all="ignore"):
-        peak = _peaks(stages, size + mean) + size + mean
-        top = np.sqrt(np.maximum(stages.k, 0.0) / np.where(stages.sign < 0, -stages.sign, 1.0))
-        top[np.broadcast_to(stages.sign >= 0, top.shape)] = 1.0
-        checks = [response.stable, (peak < WELL * top).all(axis=0)]
-        checks += [_alone_or_low(stages, response, m, peak[m]) for m in range(stages.n)]
-    sure: Bools = np.logical_and.reduce(checks)
-    return sure
+    peak = _peaks(stages, size + mean) + size + mean
+    top = np.sqrt(np.maximum(stages.k, 0.0) / np.where(stages.sign < 0, -stages.sign, 1.0))
+    top[np.broadcast_to(stages.sign >= 0, top.shape)] = 1.0
+    depth = np.zeros(len(stages), dtype=np.int64)
+    for m in range(stages.n):
+        sure = (peak[m] < WELL * top[m]) & _alone_or_low(stages, response, m, peak[m])
+        depth[~sure] = m + 1
+    return depth
+
+
+def _followed(chain: Chain, setting: Setting, count: int, phasor: NDArray[np.complex128]) -> Bools:
+    """Whether the envelope of the first `count` oscillators surely reaches `phasor`, shape (N, n)."""
+    if count < chain.n:
+        spread = chain.spread
+        if spread is not None:
+            spread = Spread(spread.delta[:count], spread.beta[:count], spread.stiffness[:count])
+        chain = Chain(count, chain.delta, chain.beta, kind=chain.kind, spread=spread)
+        setting = Setting(
+            setting.epsilon, setting.lam[:, :count], setting.omega, setting.preload, setting.bias[:, :count],
+            setting.phase,
+        )  # fmt: skip
+    decision = decide(chain, setting, Start.REST)
+    wanted = phasor[:, :count]
+    here = np.abs(decision.phasor - wanted) <= SAME * np.abs(wanted)
+    settled: Bools = np.logical_and.reduce(here, axis=1) & decision.sure
+    return settled
 
 
 def _contracting(stages: Stages, response: Response) -> Bools:

@@ -13,7 +13,7 @@ from .chain import Chain, Setting
 from .errors import ChainError
 from .response import Response
 
-__all__ = ["RUNGS", "Rung", "RungError", "Start", "load_rung"]
+__all__ = ["MAX_PERIODS", "RUNGS", "Rung", "RungError", "Start", "load_rung"]
 
 RUNGS = {
     "static": ("chainsim.static", "StaticRung"),
@@ -23,6 +23,10 @@ RUNGS = {
     "envelope": ("chainsim.envelope_rung", "EnvelopeRung"),
     "ode": ("chainsim.ode", "OdeRung"),
 }
+
+
+MAX_PERIODS = 60_000
+"""Drive periods of the full equations after which a setting is out of budget: 75 e-folds at Q = 250."""
 
 
 class RungError(ChainError, ValueError):

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from .chain import Chain, Closure, CouplingKind, Setting
-from .ladder import solve
-from .response import Outcome, Response
 from .rung import Start
+from .simulate_answer import plain_of, plain_with_terms
+from .simulate_terms import TermsSection
 from .yamlfile import parse_model, read_model
 
 __all__ = ["Simulation", "parse_simulation", "read_simulation", "simulate"]
@@ -115,11 +113,13 @@ class Simulation(_Part):
     ----------
     chain : n or grid, delta, beta, and optionally stiffness, closure, kind. setting : epsilon, lam (in a grid lam_x
         and lam_y), omega, and optionally preload, bias, phase.
+    terms : what else the actuators do, see `TermsSection`; each off unless asked for.
     rung : a name in `RUNGS` or auto. tol : wanted accuracy. start : rest, ramp or all.
     """
 
     chain: _Chain
     setting: _Setting
+    terms: TermsSection | None = None
     rung: Literal["auto", "static", "linear", "one_harmonic", "harmonic_balance", "envelope", "ode"] = "auto"
     tol: Annotated[float, Field(ge=1e-12, le=1)]
     start: Start = Start.REST
@@ -129,6 +129,15 @@ class Simulation(_Part):
     def _fits_the_chain(cls, value: _Setting, info: ValidationInfo) -> _Setting:
         if "chain" in info.data:
             value.built(info.data["chain"].built(), info.data["chain"].grid is not None)
+        return value
+
+    @field_validator("terms")
+    @classmethod
+    def _tones_differ(cls, value: TermsSection | None, info: ValidationInfo) -> TermsSection | None:
+        setting = info.data.get("setting")
+        tones = [] if value is None or setting is None else [setting.omega, *(tone.omega for tone in value.tones or ())]
+        if len(set(tones)) < len(tones):
+            raise ValueError(f"tones: expected frequencies other than the setting's {tones[0]:g} and each other's")
         return value
 
 
@@ -161,7 +170,17 @@ def simulate(what: Path | Simulation | Mapping[str, Any]) -> dict[str, Any]:
     -------
     dict of plain JSON values: outcome, rung, phasor, phase_step_deg, third, mean, stable, locked, multipliers, branch,
     error_estimate, stats. Complex numbers are [re, im]; what is not known is None (null in JSON, which has no NaN).
-    With start ``all`` these are of the lowest stable branch, and `answers` lists every branch.
+    Some answers have more keys:
+
+    start all : the first keys are of the lowest stable branch; `answers` lists every branch, and `complete` says
+        whether each single-harmonic answer is among them.
+    outcome not_locked : `beat`, with `omega`, the strongest line's beside the drive's less the drive's, `depth`,
+        (largest - smallest)/largest amplitude, and `phasor` and `phase_step_deg` of the part that follows the drive.
+    several tones : `lines`, of which k counts the tones, the setting's first: `k`, `omega`, `phasor`.
+    creep : `drift`, the way to the end: `tau`, `mean` and `amplitude`; None where it was not followed.
+
+    With terms, phasors are those of the tips, multipliers and branch are not known, and `stable` says whether the
+    motion was reached by integration (None for rung harmonic_balance, which does not look).
 
     Raises
     ------
@@ -176,48 +195,7 @@ def simulate(what: Path | Simulation | Mapping[str, Any]) -> dict[str, Any]:
         what = parse_simulation(yaml.safe_dump(dict(what), sort_keys=False), "spec")
     chain = what.chain.built()
     setting = what.setting.built(chain, what.chain.grid is not None)
-    response = solve(chain, setting, tol=what.tol, rung=what.rung, start=what.start)
-    answers = [_plain(response, index) for index in range(len(response))]
-    if what.start is not Start.ALL:
-        return answers[0]
-    first = next((answer for answer in answers if answer["outcome"] == Outcome.OK), answers[0])
-    return {**first, "answers": answers}
-
-
-def _plain(response: Response, index: int) -> dict[str, Any]:
-    stats = response.stats
-    return {
-        "outcome": str(response.outcome[index]),
-        "rung": response.rung,
-        "phasor": _pairs(response.phasor[index]),
-        "phase_step_deg": _numbers(np.degrees(response.phase_step[index])),
-        "third": _pairs(response.third[index]),
-        "mean": _numbers(response.mean[index]),
-        "stable": bool(response.stable[index]),
-        "locked": bool(response.locked[index]),
-        "multipliers": _pairs(response.multipliers[index].reshape(-1)),
-        "branch": [int(branch) for branch in response.branch[index]],
-        "error_estimate": _number(float(response.error_estimate[index])),
-        "stats": {
-            "seconds": stats.seconds,
-            "rhs_evals": stats.rhs_evals,
-            "newton_steps": stats.newton_steps,
-            "oscillators_solved": stats.oscillators_solved,
-            "periods": stats.periods,
-        },
-    }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _numbers(values: NDArray[np.float64]) -> list[float | None]:
-    return [_number(float(value)) for value in values]
-
-
-def _pairs(values: NDArray[np.complex128]) -> list[list[float | None]]:
-    known = np.isfinite(values)
-    return [
-        [float(value.real), float(value.imag)] if ok else [None, None] for value, ok in zip(values, known, strict=True)
-    ]
+    if what.terms is None:
+        return plain_of(chain, setting, tol=what.tol, rung=what.rung, start=what.start)
+    terms = what.terms.built(setting)
+    return plain_with_terms(chain, setting, terms, tol=what.tol, rung=what.rung, start=what.start)

@@ -7,7 +7,7 @@ Appl. Numer. Math. 68 (2013) 58-72: with kicks of size eps, an error of eps h^8 
 The state of an oscillator is (q, p) with q = z and p = v + (delta/2) z, in which the damped flow over t is
 ``q' = c q + s p, p' = c p - d q``: e^{-delta t/2} times a rotation, and a rotation is three shears, of p by q, of q by
 p, of p by q. The outer ones are of the kind of a kick and go with the kicks beside them; the factor goes into the
-forces and the cubic term, once a step into the state. So a kick and the flow after it take six multiplying
+forces and the cubic term, once a step into the state. So a kick and the flow after it take five multiplying
 instructions, and p's shears keep the determinant whatever is rounded.
 """
 
@@ -26,17 +26,18 @@ __all__ = ["FLOWS", "KICKS", "KICK_TIMES", "WIDTH", "System", "advance_block", "
 
 Floats = NDArray[np.float64]
 
-WIDTH = 16
+WIDTH = 48
 """Settings a caller should hand over together, or a multiple of it."""
 
-# Settings advanced side by side: four vectors of eight hide each other's latency.
-_LANES = 32
-# A block's rows that all oscillators share: at every kick the force on the next oscillator, the cubic coefficient, the
-# growth of the forces; then the step, its decay and the last oscillator's position.
-_CUBIC, _GROWTH, _STEP, _DECAY, _CLOSING, _SHARED = (_LANES * row for row in (7, 14, 21, 22, 23, 25))
-# One oscillator's rows: q, p, link into it, link into the next, constant force, shears of q by p, shears of p by q
+# Side by side. The innermost loop takes three vectors of eight, a third apart, which hide each other's latency.
+_LANES, _THIRD = WIDTH, WIDTH // 3
+# A block's rows that all oscillators share: at every kick the position (or force) that pulls the next oscillator, the
+# cubic coefficient, the growth of the forces; then the step, its decay, the last oscillator's position, and the drive's
+# constant and factors of cosine and sine.
+_CUBIC, _GROWTH, _STEP, _DECAY, _CLOSING, _DRIVE, _SHARED = (_LANES * row for row in (7, 14, 21, 22, 23, 24, 28))
+# One oscillator's rows: q, p, link into it, weight of what pulls it, constant force, shears of q by p, shears of p by q
 # between flows, the pending shear.
-_LINK, _PASS, _CONSTANT, _BY_P, _BY_Q, _PENDING, _ROW = (_LANES * row for row in (2, 3, 4, 5, 9, 13, 14))
+_LINK, _PULL, _CONSTANT, _BY_P, _BY_Q, _PENDING, _ROW = (_LANES * row for row in (2, 3, 4, 5, 9, 13, 14))
 
 _A = (0.0711334264982231177779387300061549964174, 0.241153427956640098736487795326289649618,
       0.521411761772814789212136078067994229991, -0.333698616227678005726562603400438876027)  # fmt: skip
@@ -157,45 +158,68 @@ def _share(shared: Floats, delta: float, beta: float) -> None:
 
 
 @inlined
-def _step_row(row: Floats, shared: Floats) -> None:
-    """One step of one oscillator under the forces in `shared`, which become those on the next."""
-    for w in range(_LANES):
-        x, y, lam = row[w], row[_LANES + w], row[_PASS + w]
-        s0, s1, s2 = row[_BY_P + w], row[_BY_P + _LANES + w], row[_BY_P + 2 * _LANES + w]
-        g0, g1, g2 = row[_BY_Q + w], row[_BY_Q + _LANES + w], row[_BY_Q + 2 * _LANES + w]
-        g3, s3, decay = row[_BY_Q + 3 * _LANES + w], row[_BY_P + 3 * _LANES + w], shared[_DECAY + w]
-        y = (y + _B0 * shared[w]) + (g0 + shared[_CUBIC + w] * (x * x)) * x
-        shared[w] = lam * x
-        x += s0 * y
-        y = (y + _B1 * shared[_LANES + w]) + (g1 + shared[_CUBIC + _LANES + w] * (x * x)) * x
-        shared[_LANES + w] = lam * x
-        x += s1 * y
-        y = (y + _B2 * shared[2 * _LANES + w]) + (g2 + shared[_CUBIC + 2 * _LANES + w] * (x * x)) * x
-        shared[2 * _LANES + w] = lam * x
-        x += s2 * y
-        y = (y + _B3 * shared[3 * _LANES + w]) + (g3 + shared[_CUBIC + 3 * _LANES + w] * (x * x)) * x
-        shared[3 * _LANES + w] = lam * x
-        x += s2 * y
-        y = (y + _B2 * shared[4 * _LANES + w]) + (g2 + shared[_CUBIC + 4 * _LANES + w] * (x * x)) * x
-        shared[4 * _LANES + w] = lam * x
-        x += s1 * y
-        y = (y + _B1 * shared[5 * _LANES + w]) + (g1 + shared[_CUBIC + 5 * _LANES + w] * (x * x)) * x
-        shared[5 * _LANES + w] = lam * x
-        x += s0 * y
-        y = (y + _B0 * shared[6 * _LANES + w]) + (g0 + shared[_CUBIC + 6 * _LANES + w] * (x * x)) * x
-        shared[6 * _LANES + w] = lam * x
-        x += s3 * y
-        row[w], row[_LANES + w] = decay * x, decay * y
+def _kick(
+    shared: Floats, row: Floats, kick: int, w: int, x: float, y: float, pull: float, bend: int, along: int
+) -> tuple[float, float]:
+    """A kick and the flow after it; what pulled gives way to the position at which the next oscillator is pulled."""
+    at = kick * _LANES + w
+    y = (y + pull * shared[at]) + (row[_BY_Q + bend * _LANES + w] + shared[_CUBIC + at] * (x * x)) * x
+    shared[at] = x
+    return x + row[_BY_P + along * _LANES + w] * y, y
 
 
 @inlined
-def _force(shared: Floats, drives: Floats, phases: Floats) -> None:
+def _step_row(row: Floats, shared: Floats) -> None:
+    """One step of one oscillator under what pulls in `shared`, which becomes what pulls the next."""
+    for w in range(_THIRD):
+        s, t = _THIRD + w, 2 * _THIRD + w
+        x, y, a = row[w], row[_LANES + w], row[_PULL + w]
+        u, v, b = row[s], row[_LANES + s], row[_PULL + s]
+        p, q, c = row[t], row[_LANES + t], row[_PULL + t]
+        x, y = _kick(shared, row, 0, w, x, y, _B0 * a, 0, 0)
+        u, v = _kick(shared, row, 0, s, u, v, _B0 * b, 0, 0)
+        p, q = _kick(shared, row, 0, t, p, q, _B0 * c, 0, 0)
+        x, y = _kick(shared, row, 1, w, x, y, _B1 * a, 1, 1)
+        u, v = _kick(shared, row, 1, s, u, v, _B1 * b, 1, 1)
+        p, q = _kick(shared, row, 1, t, p, q, _B1 * c, 1, 1)
+        x, y = _kick(shared, row, 2, w, x, y, _B2 * a, 2, 2)
+        u, v = _kick(shared, row, 2, s, u, v, _B2 * b, 2, 2)
+        p, q = _kick(shared, row, 2, t, p, q, _B2 * c, 2, 2)
+        x, y = _kick(shared, row, 3, w, x, y, _B3 * a, 3, 2)
+        u, v = _kick(shared, row, 3, s, u, v, _B3 * b, 3, 2)
+        p, q = _kick(shared, row, 3, t, p, q, _B3 * c, 3, 2)
+        x, y = _kick(shared, row, 4, w, x, y, _B2 * a, 2, 1)
+        u, v = _kick(shared, row, 4, s, u, v, _B2 * b, 2, 1)
+        p, q = _kick(shared, row, 4, t, p, q, _B2 * c, 2, 1)
+        x, y = _kick(shared, row, 5, w, x, y, _B1 * a, 1, 0)
+        u, v = _kick(shared, row, 5, s, u, v, _B1 * b, 1, 0)
+        p, q = _kick(shared, row, 5, t, p, q, _B1 * c, 1, 0)
+        x, y = _kick(shared, row, 6, w, x, y, _B0 * a, 0, 3)
+        u, v = _kick(shared, row, 6, s, u, v, _B0 * b, 0, 3)
+        p, q = _kick(shared, row, 6, t, p, q, _B0 * c, 0, 3)
+        row[w], row[_LANES + w] = shared[_DECAY + w] * x, shared[_DECAY + w] * y
+        row[s], row[_LANES + s] = shared[_DECAY + s] * u, shared[_DECAY + s] * v
+        row[t], row[_LANES + t] = shared[_DECAY + t] * p, shared[_DECAY + t] * q
+
+
+@inlined
+def _forced(shared: Floats, w: int, phase: Floats) -> float:
+    cosine, sine = shared[_DRIVE + _LANES + w], shared[_DRIVE + 2 * _LANES + w]
+    return float(shared[_DRIVE + w] + cosine * phase[0] + sine * phase[1])
+
+
+@inlined
+def _force(shared: Floats, phases: Floats) -> None:
     """Forces on the first oscillator at the seven kicks."""
-    for k in range(7):
-        x, y = phases[k, 0], phases[k, 1]
-        force, growth = shared[k * _LANES : (k + 1) * _LANES], shared[_GROWTH + k * _LANES : _GROWTH + (k + 1) * _LANES]
-        for w in range(_LANES):
-            force[w] = growth[w] * (drives[w] + drives[_LANES + w] * x + drives[2 * _LANES + w] * y)
+    first, second, third, fourth, fifth, sixth = phases[0], phases[1], phases[2], phases[3], phases[4], phases[5]
+    for w in range(_LANES):
+        shared[w] = shared[_GROWTH + w] * _forced(shared, w, first)
+        shared[_LANES + w] = shared[_GROWTH + _LANES + w] * _forced(shared, w, second)
+        shared[2 * _LANES + w] = shared[_GROWTH + 2 * _LANES + w] * _forced(shared, w, third)
+        shared[3 * _LANES + w] = shared[_GROWTH + 3 * _LANES + w] * _forced(shared, w, fourth)
+        shared[4 * _LANES + w] = shared[_GROWTH + 4 * _LANES + w] * _forced(shared, w, fifth)
+        shared[5 * _LANES + w] = shared[_GROWTH + 5 * _LANES + w] * _forced(shared, w, sixth)
+        shared[6 * _LANES + w] = shared[_GROWTH + 6 * _LANES + w] * _forced(shared, w, phases[6])
 
 
 @inlined
@@ -204,9 +228,11 @@ def _step_open(shared: Floats, rows: Floats, constants: bool) -> None:
     for at in range(0, len(rows), _ROW):
         _step_row(rows[at : at + _ROW], shared)
         if constants and at + _ROW < len(rows):
+            after = rows[at + _ROW : at + 2 * _ROW]
             for k in range(7):
                 for w in range(_LANES):
-                    shared[k * _LANES + w] += shared[_GROWTH + k * _LANES + w] * rows[at + _ROW + _CONSTANT + w]
+                    constant = shared[_GROWTH + k * _LANES + w] * after[_CONSTANT + w]
+                    shared[k * _LANES + w] = after[_LINK + w] * shared[k * _LANES + w] + constant
 
 
 @inlined
@@ -260,9 +286,7 @@ def _raise_peak(rows: Floats, h: Floats, peak: Floats) -> None:
 
 
 @inlined
-def _run(
-    shared: Floats, rows: Floats, drives: Floats, system: System, table: Floats, first: int, count: int, peak: Floats
-) -> None:
+def _run(shared: Floats, rows: Floats, system: System, table: Floats, first: int, count: int, peak: Floats) -> None:
     """Advance one block by `count` steps from step `first` of the period; `peak` collects max z^2 + p^2."""
     h = shared[_STEP : _STEP + _LANES]
     _share(shared, system.delta, system.beta)
@@ -272,8 +296,11 @@ def _run(
     for at in range(_ROW, len(rows), _ROW):
         for w in range(_LANES):
             constants = constants or rows[at + _CONSTANT + w] != 0.0
+    for at in range(_ROW if constants else len(rows), len(rows), _ROW):
+        for w in range(_LANES):
+            rows[at + _PULL + w] = 1.0
     for step in range(first, first + count):
-        _force(shared, drives, table[step % table.shape[0]])
+        _force(shared, table[step % table.shape[0]])
         if system.ring:
             _step_ring(shared, rows)
         else:
@@ -296,26 +323,25 @@ def advance_block(
     Parameters
     ----------
     state : float64, shape (N, 2n), all q then all p (p = v + delta/2 z); changed in place.
-    lanes : int64, indices of the settings to advance, best a multiple of 32.
+    lanes : int64, indices of the settings to advance, best a multiple of 48.
     table : `forcing_table` of the steps per period.
     peak : float64, shape (N,), raised to the largest z^2 + p^2 of any oscillator at every eighth step.
     """
     n, total = system.lam.shape[1], len(lanes)
-    shared, rows = np.zeros(_SHARED), np.zeros(n * _ROW)
-    drives, high = np.empty(3 * _LANES), np.empty(_LANES)
+    shared, rows, high = np.zeros(_SHARED), np.zeros(n * _ROW), np.empty(_LANES)
     for start in range(0, total, _LANES):
         for w in range(_LANES):
             i = lanes[min(start + w, total - 1)]
             h = system.period[i] / table.shape[0]
             shared[_STEP + w], high[w] = h, peak[i]
-            drives[w] = system.constant[i, 0]
-            drives[_LANES + w], drives[2 * _LANES + w] = system.drive[i, 0], system.drive[i, 1]
+            shared[_DRIVE + w] = system.constant[i, 0]
+            shared[_DRIVE + _LANES + w], shared[_DRIVE + 2 * _LANES + w] = system.drive[i, 0], system.drive[i, 1]
             for m in range(n):
                 at = m * _ROW + w
                 rows[at], rows[at + _LANES] = state[i, m], state[i, n + m] / h
                 rows[at + _LINK], rows[at + _CONSTANT] = system.lam[i, m], system.constant[i, m] if m else 0.0
-                rows[at + _PASS] = system.lam[i, m + 1] if m + 1 < n else 0.0
-        _run(shared, rows, drives, system, table, first, count, high)
+                rows[at + _PULL] = system.lam[i, m] if m else 1.0
+        _run(shared, rows, system, table, first, count, high)
         for w in range(min(_LANES, total - start)):
             i = lanes[start + w]
             peak[i] = high[w]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from .chain import Chain, Closure, Setting
+from .chain import Chain, Closure, CouplingKind, Setting
 from .errors import ProfileError
 from .rung import Start
 from .yamlfile import read_model
@@ -65,17 +65,46 @@ _Links = Annotated[
 ]
 
 
+Length = Annotated[int, Field(ge=1, le=1_000_000)]
+Damping = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class _Grid(_Part):
+    rows: Length
+    cols: Length
+
+
 class _Chain(_Part):
-    n: Annotated[int, Field(ge=1, le=1_000_000)]
-    delta: Annotated[float, Field(ge=0, allow_inf_nan=False)]
-    beta: Finite
+    grid: _Grid | None = None
+    n: Length | None = None
+    delta: Damping | list[Damping]
+    beta: Finite | list[Finite]
+    stiffness: Finite | list[Finite] = 1.0
     closure: Closure = Closure.OPEN
+    kind: CouplingKind = CouplingKind.RESISTOR
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> _Chain:
+        if (self.n is None) == (self.grid is None):
+            raise ValueError("give either n, the length of a chain, or grid: {rows: ..., cols: ...}")
+        self.built()
+        return self
+
+    def built(self) -> Chain:
+        rows, size = (1, self.n or 0) if self.grid is None else (self.grid.rows, self.grid.rows * self.grid.cols)
+        if size > 1_000_000:
+            raise ValueError(f"expected at most 1000000 oscillators, got {size}")
+        return Chain.of(
+            size, delta=self.delta, beta=self.beta, stiffness=self.stiffness, closure=self.closure, rows=rows,
+            kind=self.kind,
+        )  # fmt: skip
 
 
 class _Setting(_Part):
     table: str | None = None
     epsilon: _Axis | None = None
     lam: _Links | None = None
+    lam_y: Finite | None = None
     omega: _Axis | None = None
     preload: Finite = 0.0
     bias: Finite | list[Finite] = 0.0
@@ -101,7 +130,7 @@ class SettingSweep:
     columns : epsilon, lam, omega; float64, shape (a,), (b, 1 or links), (c,). As ranges each has its own length, the
         settings are all combinations and omega changes fastest; as a table (`shape` of one number) all have the same.
     shape : numbers of epsilon, lam and omega; or of the table's rows.
-    fixed : preload, bias and phase.
+    fixed : preload, bias and phase; of a grid also lam_y, unless its links downwards are those to the right.
     """
 
     chain: Chain
@@ -119,6 +148,9 @@ class SettingSweep:
         places = np.unravel_index(np.arange(first, min(last, len(self))), self.shape)
         picked = places if len(places) == 3 else places * 3
         epsilon, lam, omega = (column[at] for column, at in zip(self.columns, picked, strict=True))
+        if self.chain.rows > 1:
+            lam = lam[:, :, None]
+            return Setting.of(self.chain, epsilon=epsilon, lam=lam, omega=omega, **{"lam_y": lam, **self.fixed})
         return Setting.of(self.chain, epsilon=epsilon, lam=lam, omega=omega, **self.fixed)
 
 
@@ -126,6 +158,7 @@ def read_sweep(path: Path) -> SettingSweep:
     """Read a sweep file, and the table it names (relative to itself).
 
     ``epsilon``, ``lam`` and ``omega`` are each a number or ``{from, to, steps, log}``; ``lam`` may be a list of links.
+    A grid has one ``lam`` for all its links, or a number ``lam_y`` beside it for those downwards.
     ``table`` names an NPZ or a CSV with any of them as columns (links: ``lam_1``, ``lam_2``, ...; in NPZ one array with
     a column each); what the table lacks is a number beside it.
 
@@ -135,15 +168,18 @@ def read_sweep(path: Path) -> SettingSweep:
         When a file cannot be read or does not fit; the message starts with the place.
     """
     given = read_model(path, _File)
-    chain = Chain(given.chain.n, given.chain.delta, given.chain.beta, given.chain.closure)
-    asked = given.setting
+    chain, asked = given.chain.built(), given.setting
     table = {} if asked.table is None else _table(path.parent / asked.table)
     columns = [_column(path, asked, table, name) for name in AXES]
     if table:
         rows = len(next(iter(table.values())))
         columns = [np.broadcast_to(c, (rows, *c.shape[1:])) if len(c) == 1 else c for c in columns]
     shape = (rows,) if table else tuple(len(column) for column in columns)
-    fixed = {"preload": asked.preload, "bias": np.asarray(asked.bias), "phase": asked.phase}
+    fixed: dict[str, Any] = {"preload": asked.preload, "bias": np.asarray(asked.bias), "phase": asked.phase}
+    if asked.lam_y is not None:
+        fixed["lam_y"] = asked.lam_y
+    if chain.rows > 1 and columns[1].shape[1] != 1:
+        raise ProfileError(f"{path}: setting.lam: a grid takes one number for all its links, got {columns[1].shape[1]}")
     made = SettingSweep(chain, given.tol, given.rung == "auto", (columns[0], columns[1], columns[2]), shape, fixed)
     try:
         made.settings(0, 1)

@@ -10,11 +10,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain, Setting
+from .chain import Chain, CouplingKind, Setting
 from .fast_balance import WIDTH
 from .fast_chain import Found, Given, march_blocks
 from .fast_deep import ORDERS, Tables, march_deep, tables_for
 from .fast_floquet import nodes
+from .fast_grid import march_grids
 from .ladder import solve
 from .response import Outcome, Response, Stats
 from .rest import sure_from_rest
@@ -103,8 +104,9 @@ def unit_of(n: int) -> int:
 def sweep(chain: Chain, setting: Setting, *, tol: float, from_rest: bool) -> SweepResult:
     """Steady states of many settings of one chain.
 
-    Open chains of equal oscillators without constant forces are solved by compiled harmonic balance on all cores;
-    where harmonics 1, 3 and 5 do not meet `tol`, up to 33 are taken. Everything else is answered by `solve`, `unit_of`
+    Open chains and grids of equal oscillators over resistors without constant forces are solved by compiled harmonic
+    balance on all cores; where harmonics 1, 3 and 5 do not meet `tol`, up to 33 are taken. Everything else (rings,
+    links both ways, amplifiers, oscillators that differ, forces that do not change) is answered by `solve`, `unit_of`
     settings at a time. An answer does not depend, to the last bit, on the settings outside its unit (where harmonic
     balance answers: on any other) nor on the number of threads.
 
@@ -126,7 +128,8 @@ def sweep(chain: Chain, setting: Setting, *, tol: float, from_rest: bool) -> Swe
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
     began = time.perf_counter()
-    if not (chain.plain and chain.feed_forward) or setting.preload.any() or setting.bias.any():
+    alike = chain.spread is None and chain.kind is CouplingKind.RESISTOR and chain.feed_forward
+    if not alike or setting.preload.any() or setting.bias.any():
         answer = _blank(len(setting), chain.n)
         rung = "auto" if from_rest else "harmonic_balance"
         _fill(answer, chain, setting, np.arange(len(setting)), tol, rung)
@@ -146,6 +149,7 @@ def _lower(chain: Chain, setting: Setting, tol: float) -> SweepResult:
     sign = float(np.sign(chain.beta))
     # One layout: every other would be compiled apart.
     links = np.ascontiguousarray(setting.lam)
+    downs = None if setting.lam_y is None else np.ascontiguousarray(setting.lam_y)
     given = Given(setting.epsilon, links, setting.omega, setting.phase, float(chain.delta), sign, length)
     answer = _blank(size, chain.n)
     found = Found(
@@ -154,9 +158,16 @@ def _lower(chain: Chain, setting: Setting, tol: float) -> SweepResult:
     )  # fmt: skip
 
     def march(part: slice) -> None:
-        march_blocks(given, found, nodes(), part.start, part.stop)
+        if downs is None:
+            march_blocks(given, found, nodes(), part.start, part.stop)
+        else:
+            march_grids(given, downs, chain.cols, found, nodes(), part.start, part.stop)
 
-    in_threads(march, size, WIDTH)
+    in_threads(march, size, WIDTH if downs is None else 1)
+    if downs is not None:
+        _judge(answer, found.largest, tol)
+        _fill(answer, chain, setting, np.flatnonzero(~(answer.error_estimate <= tol)), tol, "harmonic_balance")
+        return answer
     for order in ORDERS:
         lanes = np.flatnonzero(~(answer.error_estimate <= tol))
         if not len(lanes):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
+from .inlined import inlined
 
 __all__ = ["Plant", "advance"]
 
@@ -17,9 +18,11 @@ Floats = NDArray[np.float64]
 class Plant(NamedTuple):
     """One setting of a chain with its terms.
 
-    delta, beta, stiffness, lam, bias : float64, shape (n,). preload : on the first.
+    delta, beta, stiffness, lam, other, bias : float64, shape (n,); `lam` links m - 1 into m (round a ring the last into
+        the first), `other` m + stride into m. preload : on the first.
     back : 1 for resistor links, 0 for amplifiers.
-    tones : float64, shape (T, 3), epsilon, omega, phase. amplifier : (3,) bandwidth, slew, limit, or (0,).
+    tones : float64, shape (T, 3), epsilon, omega, phase. ramp : tau over which they are raised from 0, 0 for at once.
+    amplifier : (3,) bandwidth, slew, limit, or (0,).
     bouc : (3,) gain, loading, unloading, or (0,). radius, weight : (R,); base : share of e beside the plays.
     creep : (C,) rates 1/T_i. creep_gain : g. modes : float64, shape (J, 3), omega^2, delta, gain.
     """
@@ -28,10 +31,13 @@ class Plant(NamedTuple):
     beta: Floats
     stiffness: Floats
     lam: Floats
+    other: Floats
+    stride: int
     back: float
     bias: Floats
     preload: float
     tones: Floats
+    ramp: float
     amplifier: Floats
     bouc: Floats
     radius: Floats
@@ -42,24 +48,27 @@ class Plant(NamedTuple):
     modes: Floats
 
 
-@compiled
-def _tip(row: Floats, plant: Plant, rate: int) -> float:
-    """Tip displacement (rate 0) or velocity (rate 1) of one oscillator."""
-    total = float(row[rate])
-    first = 3 + len(plant.creep) + rate * len(plant.modes)
-    for j in range(len(plant.modes)):
-        total += row[first + j]
-    return total
+@inlined
+def _tips(state: Floats, plant: Plant, tips: Floats) -> None:
+    """Displacement (row 0) and velocity (row 1) of every tip."""
+    modes, first = len(plant.modes), 3 + len(plant.creep)
+    for m in range(len(plant.lam)):
+        tips[0, m], tips[1, m] = state[m, 0], state[m, 1]
+        for j in range(modes):
+            tips[0, m] += state[m, first + j]
+            tips[1, m] += state[m, first + modes + j]
 
 
-@compiled
+@inlined
 def _drive(tau: float, plant: Plant, u: float, out: Floats) -> None:
     """out = drive, its derivative, u'."""
-    wanted, slope = 0.0, 0.0
-    for k in range(len(plant.tones)):
-        angle = plant.tones[k, 1] * tau + plant.tones[k, 2]
-        wanted += plant.tones[k, 0] * np.cos(angle)
-        slope -= plant.tones[k, 0] * plant.tones[k, 1] * np.sin(angle)
+    wanted, slope, tones = 0.0, 0.0, plant.tones
+    for k in range(len(tones)):
+        angle = tones[k, 1] * tau + tones[k, 2]
+        wanted += tones[k, 0] * np.cos(angle)
+        slope -= tones[k, 0] * tones[k, 1] * np.sin(angle)
+    if tau < plant.ramp:
+        wanted, slope = wanted * tau / plant.ramp, (slope * tau + wanted) / plant.ramp
     out[0], out[1], out[2] = wanted, slope, 0.0
     if len(plant.amplifier):
         rate = min(max(plant.amplifier[0] * (wanted - u), -plant.amplifier[1]), plant.amplifier[1])
@@ -68,53 +77,92 @@ def _drive(tau: float, plant: Plant, u: float, out: Floats) -> None:
         out[1] = rate if abs(u) < limit else 0.0
 
 
-@compiled
-def _force(e: float, change: float, row: Floats, play: Floats, plant: Plant, out: Floats) -> float:
+@inlined
+def _electric(m: int, tips: Floats, drive: Floats, plant: Plant, rate: int) -> float:
+    """Electric force on oscillator m (rate 0), or its change (rate 1)."""
+    n, lam, other = len(plant.lam), plant.lam[m], plant.other[m]
+    e = float(drive[rate]) if m == 0 else 0.0
+    if rate == 0:
+        e += plant.bias[m]
+    if lam != 0.0:
+        e += lam * tips[rate, m - 1 if m else n - 1]
+    if other != 0.0:
+        e += other * tips[rate, m + plant.stride]
+    return float(e - plant.back * (lam + other) * tips[rate, m])
+
+
+@inlined
+def _force(m: int, e: float, change: float, state: Floats, play: Floats, plant: Plant, out: Floats) -> float:
     """Force under the electric force `e` that changes at the rate `change`; writes the rates of h and the creep."""
     f = plant.base * e
     for i in range(len(plant.radius)):
-        f += plant.weight[i] * min(max(play[i], e - plant.radius[i]), e + plant.radius[i])
+        f += plant.weight[i] * min(max(play[m, i], e - plant.radius[i]), e + plant.radius[i])
     if len(plant.bouc):
-        h = row[2]
+        h = state[m, 2]
         f -= h
-        out[2] = plant.bouc[0] * change - plant.bouc[1] * abs(change) * h - plant.bouc[2] * change * abs(h)
+        out[m, 2] = plant.bouc[0] * change - plant.bouc[1] * abs(change) * h - plant.bouc[2] * change * abs(h)
     whole = f
     for i in range(len(plant.creep)):
-        whole += row[3 + i]
-        out[3 + i] = plant.creep[i] * (plant.creep_gain * f - row[3 + i])
+        whole += state[m, 3 + i]
+        out[m, 3 + i] = plant.creep[i] * (plant.creep_gain * f - state[m, 3 + i])
     return whole
 
 
 @compiled
-def _electric(m: int, state: Floats, drive: Floats, plant: Plant, rate: int) -> float:
-    """Electric force on oscillator m (rate 0), or its change (rate 1)."""
-    n = len(plant.lam)
-    e = drive[rate] if m == 0 else 0.0
-    if rate == 0:
-        e += plant.bias[m]
-    if plant.lam[m] != 0.0:
-        e += plant.lam[m] * (_tip(state[m - 1 if m else n - 1], plant, rate) - plant.back * _tip(state[m], plant, rate))
-    return e
-
-
-@compiled
-def _slope(tau: float, state: Floats, play: Floats, plant: Plant, drive: Floats, out: Floats) -> None:
+def _slope(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats, out: Floats) -> None:
+    """`scratch` has two rows for the tips and one, of three or more numbers, for the drive."""
     n, modes, first = len(plant.lam), len(plant.modes), 3 + len(plant.creep)
+    drive = scratch[2]
     _drive(tau, plant, state[n, 0], drive)
+    _tips(state, plant, scratch)
     out[n, 0] = drive[2]
     for m in range(n):
-        row, to = state[m], out[m]
-        e, change = _electric(m, state, drive, plant, 0), _electric(m, state, drive, plant, 1)
-        f = _force(e, change, row, play[m], plant, to)
-        z, v = row[0], row[1]
-        to[0] = v
-        to[1] = f - plant.delta[m] * v - plant.stiffness[m] * z - plant.beta[m] * z * z * z
-        if m == 0:
-            to[1] += plant.preload
+        e = _electric(m, scratch, drive, plant, 0)
+        change = _electric(m, scratch, drive, plant, 1) if len(plant.bouc) else 0.0
+        f = _force(m, e, change, state, play, plant, out)
+        z, v = state[m, 0], state[m, 1]
+        out[m, 0] = v
+        out[m, 1] = f - plant.delta[m] * v - plant.stiffness[m] * z - plant.beta[m] * z * z * z
         for j in range(modes):
-            q, w = row[first + j], row[first + modes + j]
-            to[first + j] = w
-            to[first + modes + j] = plant.modes[j, 2] * f - plant.modes[j, 1] * w - plant.modes[j, 0] * q
+            q, w = state[m, first + j], state[m, first + modes + j]
+            out[m, first + j] = w
+            out[m, first + modes + j] = plant.modes[j, 2] * f - plant.modes[j, 1] * w - plant.modes[j, 0] * q
+    out[0, 1] += plant.preload
+
+
+@inlined
+def _beside(state: Floats, h: float, work: Floats, k: int) -> None:
+    """work[4] = state + h work[k]."""
+    for m in range(state.shape[0]):
+        for j in range(state.shape[1]):
+            work[4, m, j] = state[m, j] + h * work[k, m, j]
+
+
+@inlined
+def _step(tau: float, h: float, state: Floats, play: Floats, plant: Plant, scratch: Floats, work: Floats) -> None:
+    """One step of the classical method in place; `work` has room for four slopes and a state."""
+    here = work[4]
+    _slope(tau, state, play, plant, scratch, work[0])
+    _beside(state, 0.5 * h, work, 0)
+    _slope(tau + 0.5 * h, here, play, plant, scratch, work[1])
+    _beside(state, 0.5 * h, work, 1)
+    _slope(tau + 0.5 * h, here, play, plant, scratch, work[2])
+    _beside(state, h, work, 2)
+    _slope(tau + h, here, play, plant, scratch, work[3])
+    for m in range(state.shape[0]):
+        for j in range(state.shape[1]):
+            state[m, j] += (h / 6) * (work[0, m, j] + 2 * work[1, m, j] + 2 * work[2, m, j] + work[3, m, j])
+
+
+@inlined
+def _push_plays(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats) -> None:
+    n = len(plant.lam)
+    _drive(tau, plant, state[n, 0], scratch[2])
+    _tips(state, plant, scratch)
+    for m in range(n):
+        e = _electric(m, scratch, scratch[2], plant, 0)
+        for i in range(len(plant.radius)):
+            play[m, i] = min(max(play[m, i], e - plant.radius[i]), e + plant.radius[i])
 
 
 @compiled
@@ -126,24 +174,16 @@ def advance(
     Returns how many rows were written: fewer where a |z| passed `limit`.
     """
     n = len(plant.lam)
-    k1, k2, k3, k4 = np.zeros_like(state), np.zeros_like(state), np.zeros_like(state), np.zeros_like(state)
-    drive = np.empty(3)
+    work, scratch = np.zeros((5, state.shape[0], state.shape[1])), np.zeros((3, max(n, 3)))
     for k in range(len(seen)):
         for j in range(every):
             tau = begin + (k * every + j) * h
-            _slope(tau, state, play, plant, drive, k1)
-            _slope(tau + 0.5 * h, state + 0.5 * h * k1, play, plant, drive, k2)
-            _slope(tau + 0.5 * h, state + 0.5 * h * k2, play, plant, drive, k3)
-            _slope(tau + h, state + h * k3, play, plant, drive, k4)
-            state += (h / 6) * (k1 + 2 * k2 + 2 * k3 + k4)
+            _step(tau, h, state, play, plant, scratch, work)
             if len(plant.radius):
-                _drive(tau + h, plant, state[n, 0], drive)
-                for m in range(n):
-                    e = _electric(m, state, drive, plant, 0)
-                    for i in range(len(plant.radius)):
-                        play[m, i] = min(max(play[m, i], e - plant.radius[i]), e + plant.radius[i])
+                _push_plays(tau + h, state, play, plant, scratch)
+        _tips(state, plant, scratch)
         for m in range(n):
             if not abs(state[m, 0]) <= limit:
                 return k
-            seen[k, m] = _tip(state[m], plant, 0)
+            seen[k, m] = scratch[0, m]
     return len(seen)

@@ -9,17 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain, Closure, CouplingKind, Setting
+from .chain import Chain, CouplingKind, Setting
 from .response import Outcome, Stats
+from .scaling import second_links
 from .terms import BoucWen, Play, Terms, TermsError, Tone
 from .terms_kernel import Plant, advance
 
-__all__ = ["Motion", "integrate_terms"]
+__all__ = ["LONGEST", "Motion", "Walk", "integrate_terms"]
 
 Floats = NDArray[np.float64]
 
-# Phase of the fastest oscillation or decay in one step; the classical method is stable to 2.78.
 LONGEST = 1.0
+"""Phase of the fastest oscillation or decay in one step; the classical method is stable to 2.78."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,48 @@ class Motion:
         return phasor
 
 
+class Walk:
+    """One setting on its way from rest (z = z' = 0, no hysteresis, amplifier at 0), stretch by stretch.
+
+    Parameters
+    ----------
+    ramp : tau over which the drive is raised from 0; 0 for a sudden drive.
+
+    Raises
+    ------
+    TermsError
+        When `setting` is not one setting of `chain`.
+    """
+
+    def __init__(self, chain: Chain, setting: Setting, terms: Terms, *, ramp: float) -> None:
+        self.plant = _plant(chain, setting, terms, ramp)
+        columns = 3 + len(self.plant.creep) + 2 * len(self.plant.modes)
+        self.state = np.zeros((chain.n + 1, columns))
+        self.play = np.zeros((chain.n, len(self.plant.radius)))
+        self.tau = 0.0
+        self.evals = 0
+        softest = self.plant.beta.min()
+        self._limit = 50 / math.sqrt(float(np.abs(self.plant.beta).max())) if softest < 0 else 1e9
+
+    @property
+    def fastest(self) -> float:
+        """A bound of every rate, per tau: `LONGEST` over it is the longest step."""
+        return _fastest(self.plant)
+
+    @property
+    def relaxed(self) -> Floats:
+        """The creeps' slow parts, a view; float64, shape (n, C)."""
+        return self.state[:-1, 3 : 3 + len(self.plant.creep)]
+
+    def go(self, rows: int, every: int, h: float) -> Floats:
+        """Take ``rows every`` steps of `h`; the tips after each `every`, shape (rows, n), fewer rows once escaped."""
+        tip = np.empty((rows, len(self.plant.lam)))
+        done = advance(self.state, self.play, self.plant, self.tau, h, every, self._limit, tip)
+        self.tau += rows * every * h
+        self.evals += 4 * rows * every * tip.shape[1]
+        return tip[:done]
+
+
 def integrate_terms(
     chain: Chain, setting: Setting, terms: Terms, *, duration: float, step: float, every: int
 ) -> Motion:
@@ -64,40 +107,30 @@ def integrate_terms(
         With the argument and its value.
     """
     began = time.perf_counter()
-    plant = _plant(chain, setting, terms)
+    walk = Walk(chain, setting, terms, ramp=0.0)
     if not (math.isfinite(duration) and duration > 0 and step > 0 and every >= 1):
         raise TermsError(f"duration, step, every: expected numbers > 0, got {duration}, {step}, {every}")
-    fastest = _fastest(plant)
+    fastest = walk.fastest
     if step * fastest > LONGEST:
         raise TermsError(f"step: expected at most {LONGEST / fastest:.4g} for a rate of {fastest:.4g}, got {step}")
     rows = max(1, round(duration / (step * every)))
     h = duration / (rows * every)
-    columns = 3 + len(plant.creep) + 2 * len(plant.modes)
-    state, play = np.zeros((chain.n + 1, columns)), np.zeros((chain.n, len(plant.radius)))
-    beta = float(np.abs(plant.beta).max())
-    limit = 50 / math.sqrt(beta) if plant.beta.min() < 0 else 1e9
-    tip = np.empty((rows, chain.n))
-    done = advance(state, play, plant, 0.0, h, every, limit, tip)
-    tau = np.arange(1.0, done + 1) * (every * h)
-    tip = tip[:done]
+    tip = walk.go(rows, every, h)
+    tau = np.arange(1.0, len(tip) + 1) * (every * h)
     for array in (tau, tip):
         array.flags.writeable = False
-    stats = Stats(rhs_evals=4 * rows * every * chain.n, seconds=time.perf_counter() - began)
-    return Motion(tau, tip, Outcome.OK if done == rows else Outcome.ESCAPED, stats)
+    stats = Stats(rhs_evals=walk.evals, seconds=time.perf_counter() - began)
+    return Motion(tau, tip, Outcome.OK if len(tip) == rows else Outcome.ESCAPED, stats)
 
 
-def _plant(chain: Chain, setting: Setting, terms: Terms) -> Plant:
+def _plant(chain: Chain, setting: Setting, terms: Terms, ramp: float) -> Plant:
     if len(setting) != 1 or setting.n != chain.n:
         raise TermsError(f"setting: expected one setting of the chain, got {len(setting)} of {setting.n}")
-    if chain.rows > 1 or chain.closure is Closure.BIDIRECTIONAL:
-        raise TermsError(
-            "chain: terms are integrated for open chains and rings; a grid or bidirectional chain has none"
-        )
-    each = np.ones(chain.n)
-    back = float(chain.kind is CouplingKind.RESISTOR)
+    each, none = np.ones(chain.n), np.empty(0)
+    links, stride = second_links(chain, setting)
     one = Tone(float(setting.epsilon[0]), float(setting.omega[0]), float(setting.phase[0]))
     tones = np.array([[t.epsilon, t.omega, t.phase] for t in terms.tones or (one,)])
-    amplifier, hysteresis, creep, none = terms.amplifier, terms.hysteresis, terms.creep, np.empty(0)
+    amplifier, hysteresis, creep = terms.amplifier, terms.hysteresis, terms.creep
     bouc, radius, weight, base = none, none, none, 1.0
     if isinstance(hysteresis, BoucWen):
         bouc = np.array([hysteresis.gain, hysteresis.loading, hysteresis.unloading])
@@ -105,8 +138,9 @@ def _plant(chain: Chain, setting: Setting, terms: Terms) -> Plant:
         radius, weight, base = np.array(hysteresis.radius), np.array(hysteresis.weight), hysteresis.base
     modes = np.array([[mode.omega**2, mode.delta, mode.gain] for mode in terms.modes or ()]).reshape(-1, 3)
     return Plant(
-        chain.deltas * each, chain.betas * each, chain.stiffness * each, np.array(setting.lam[0]), back,
-        np.array(setting.bias[0]), float(setting.preload[0]), tones,
+        chain.deltas * each, chain.betas * each, chain.stiffness * each, np.array(setting.lam[0]),
+        0.0 * each if links is None else np.array(links[0]), stride,
+        float(chain.kind is CouplingKind.RESISTOR), np.array(setting.bias[0]), float(setting.preload[0]), tones, ramp,
         none if amplifier is None else np.array([amplifier.bandwidth, amplifier.slew, amplifier.limit]),
         bouc, radius, weight, base, none if creep is None else 1 / np.array(creep.times),
         0.0 if creep is None else creep.per_decade / creep.each, modes,
@@ -114,11 +148,11 @@ def _plant(chain: Chain, setting: Setting, terms: Terms) -> Plant:
 
 
 def _fastest(plant: Plant) -> float:
-    """A bound of every rate, per tau."""
+    links = float((np.abs(plant.lam) + np.abs(plant.other)).max())
     share = 1 + float(np.abs(plant.modes[:, 2]).sum())
-    own = math.sqrt(float((np.abs(plant.stiffness) + share * np.abs(plant.lam)).max()))
+    own = math.sqrt(float(np.abs(plant.stiffness).max()) + 2 * share * links)
     rates = [own, float(plant.delta.max()), float(np.abs(plant.tones[:, 1]).max())]
-    rates += [math.sqrt(float(row[0] + abs(row[2]) * np.abs(plant.lam).max())) for row in plant.modes]
+    rates += [math.sqrt(float(row[0] + 2 * abs(row[2]) * links)) for row in plant.modes]
     rates += [float(plant.amplifier[0])] if len(plant.amplifier) else []
     rates += [float(plant.creep.max())] if len(plant.creep) else []
     return max(rates)

@@ -30,7 +30,7 @@ class BenchReport:
     def as_text(self) -> str:
         """Our own figures, then a line for each peer."""
         found = self.found
-        steady, long = found["steady"], found["lengths"]
+        steady = found["steady"]
         lines = [
             f"load of the machine before and after: {found['load_before']:.1f}, {found['load_after']:.1f}",
             f"steady states of {steady['settings']}: {1e3 * steady['wall_s']:.0f} ms wall, "
@@ -42,10 +42,25 @@ class BenchReport:
             f"{each['median_error']:.1e}, {100 * each['share_of_limit']:.0f} % of the arithmetic limit"
             for each in found["transients"]
         ]
-        lines.append(f"chains of {long['n'][0]} to {long['n'][-1]}: cost grows as n^{long['slope']:.2f}")
+        lines += [
+            f"{name}s of {each['n'][0]} to {each['n'][-1]} oscillators: time grows as n^{each['slope']:.2f}, memory as "
+            f"n^{each['memory_slope']:.2f}; the largest {each['cpu_s'][-1]:.2f} s, {each['bytes'][-1] / 1e6:.0f} MB"
+            for name, each in found["lengths"].items()
+        ]
+        lines.append(f"map of {found['map']['settings']} settings to NPZ and PNG: {found['map']['wall_s']:.2f} s")
         for name, peer in found["peers"].items():
             lines.append(f"{name}: {_said(peer)}")
+        lines += [_goal(each) for each in found["goals"]]
         return "\n".join([*lines, f"written: {self.folder / 'bench.json'}, {self.folder / 'bench.svg'}"])
+
+
+def _goal(each: dict[str, Any]) -> str:
+    unit = f" {each['unit']}" if each["unit"] else ""
+    asked = f"at {each['sense']} {each['goal']:g}{unit}"
+    if each["reached"] is None:
+        return f"goal, {each['what']}: {asked}; not measured"
+    verdict = "reached" if each["reached"] else "NOT reached"
+    return f"goal, {each['what']}: {asked}; {each['measured']:.3g}{unit}, {verdict}"
 
 
 def _said(peer: dict[str, Any]) -> str:

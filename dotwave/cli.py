@@ -19,7 +19,7 @@ from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
-from .command import Device, Json, Written, printable
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, printable
 from .command import finish as _finish
 from .errors import Terminated, bad_input
 from .options import Dots, Presentation, SampleFormat, Undefined
@@ -66,6 +66,10 @@ def text(
         str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
     ] = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
+    explain: Explain = False,
+    pareto: Pareto = None,
     as_json: Json = False,
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
@@ -78,18 +82,22 @@ def text(
     Example:
       dotwave text "Hello world" --device linked-6x6 -o hello.wav
     """
+    from .asked import asked_of
     from .options import place_of, text_options
     from .pipeline import render_text
+    from .study import Study
 
+    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
     options = text_options(
         table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
         presentation=presentation, dots=dots, blank_between=blank_between,
     )  # fmt: skip
     report = render_text(
         source, device=device, out=output, options=options, encoding=sample_format.value,
-        contrast_db=contrast, actuator=place_of(actuator),
+        contrast_db=contrast, actuator=place_of(actuator), study=study,
     )  # fmt: skip
-    _finish(report, as_json, ok=report.ok)
+    told = study.told(report, report.ok)
+    _finish(told, as_json, ok=told.ok)
 
 
 @app.command(short_help="Solve one chain and print its steady state.")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .command import Device, Json, finish
+from .command import Budget, Device, Explain, Json, Pareto, Tol, finish
 from .options import SampleFormat
 
 __all__ = ["picture_app"]
@@ -36,6 +36,8 @@ def image(
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
     contrast: Contrast = 20.0,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
     as_json: Json = False,
 ) -> None:
     """Render pictures, one after another, and write the waveforms that make them felt.
@@ -44,15 +46,19 @@ def image(
     Example:
       dotwave image samples/icons/heart.svg -o heart.wav --explain steps
     """
+    from .asked import asked_of
     from .image import picture_options, render_images
     from .render import Rendering
+    from .study import Study
 
     options = picture_options(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
-    how = Rendering(output, sample_format.value, contrast)
+    study = Study(asked_of(tol=tol, budget=budget))
+    how = Rendering(output, sample_format.value, contrast, study)
     report = render_images(files, device=device, options=options, how=how, explain=explain)
-    finish(report, as_json, ok=report.ok)
+    told = study.told(report, report.ok)
+    finish(told, as_json, ok=told.ok)
 
 
 @picture_app.command(short_help="Render a set of icons and tell them apart.")
@@ -70,6 +76,8 @@ def icons(
     dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
     contrast: Contrast = 20.0,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
     as_json: Json = False,
 ) -> None:
     """Encode and plan every icon; write manifest.json, manifest.csv, contact.png and index.html.
@@ -81,11 +89,14 @@ def icons(
     Example:
       dotwave icons samples/icons -o out/icons --distinct
     """
+    from .asked import asked_of
     from .icons import IconOptions, render_icons
 
+    asked = asked_of(tol=tol, budget=budget)
     options = IconOptions(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
+        tol=asked.tol, budget_s=asked.budget_s,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)
@@ -95,20 +106,29 @@ def icons(
 def render(
     job: Annotated[Path, typer.Argument(metavar="JOB.yaml", help="Device, tolerance, output and a sequence.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    tol: Tol = None,
+    budget: Budget = None,
+    explain: Explain = False,
+    pareto: Pareto = None,
     as_json: Json = False,
 ) -> None:
     """Render a sequence of texts, pictures, icons, textures and pauses.
 
-    Nothing is written when a frame cannot be made as asked; the exit code is then 1.
+    Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol and --budget come before
+    what the job says.
 
     \b
     Example:
       dotwave render samples/jobs/mixed.yaml
     """
+    from .asked import asked_of
     from .render import render_job
+    from .study import Study
 
-    report = render_job(job, output)
-    finish(report, as_json, ok=report.ok)
+    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
+    report = render_job(job, output, study)
+    told = study.told(report, report.ok)
+    finish(told, as_json, ok=told.ok)
 
 
 @picture_app.command(short_help="Print the JSON Schema of job files.")

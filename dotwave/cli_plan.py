@@ -57,7 +57,8 @@ def tradeoff(
     Example:
       dotwave tradeoff "Hello" --device linked-6x6 --tol 1e-3 --budget 50ms --picture front.png
     """
-    from .tradeoff_report import seconds_of, trade
+    from .asked import seconds_of
+    from .tradeoff_report import trade
 
     budget_s = None if budget is None else seconds_of(budget)
     report = trade(source, device=device, tol=tol, budget_s=budget_s, picture=picture)
@@ -75,9 +76,9 @@ def pareto(
     picture: Picture = None,
     as_json: Json = False,
 ) -> None:
-    """List the ways to make a frame that no other beats, over frequency, length of the way in and contrast.
+    """List the ways to make a frame that no other beats, over length of the way in, frequency, contrast and drive.
 
-    Every way is tried in the full equations. For devices with a lam per link, or uncoupled actuators.
+    Ways of vibrations and waves are tried in the full equations; those of deflections are closed forms.
 
     \b
     Example:

@@ -8,13 +8,25 @@ from typing import Annotated, Any, NoReturn, Protocol
 
 import typer
 
-__all__ = ["Device", "Json", "Report", "Written", "finish", "printable"]
+__all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Device = Annotated[
     str, typer.Option("--device", "-d", help="A built-in profile or a YAML file; see `dotwave devices`.")
 ]
 Written = Annotated[str, typer.Argument(metavar="OUT", help="A waveform written by `dotwave text` (.wav or .json).")]
+Tol = Annotated[
+    str | None,
+    typer.Option(help="Largest error of full scale: draft, normal, fine or a number; says what it took."),
+]
+Budget = Annotated[
+    str | None, typer.Option(help="Time for planning, such as 50ms or 2s; says how exact the answer is.")
+]
+Explain = Annotated[bool, typer.Option("--explain", help="Also list which terms of the model are needed, and why.")]
+Pareto = Annotated[
+    str | None,
+    typer.Option(metavar="N|PICTURE|N:PICTURE", help="Also list what frame N (else 1) can be bought for; draw it."),
+]
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 

@@ -40,7 +40,7 @@ class IconsReport:
     pairs : how many pairs have each distance, from 0.
     failed : name -> what is wrong with it. unfinished : names that were not reached; `complete` is then False.
     worked : pieces of work done in this run, none of them done before. seconds : taken.
-    files : what was written.
+    files : what was written. reached : sentences on a tolerance or a budget.
     """
 
     icons: tuple[Icon, ...]
@@ -55,6 +55,7 @@ class IconsReport:
     worked: int
     seconds: float
     files: tuple[str, ...] = ()
+    reached: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, icons: Sequence[Icon], *, closer_than: int, failed: Mapping[str, str], **known: Any) -> IconsReport:
@@ -106,7 +107,8 @@ class IconsReport:
 
     def as_dict(self) -> dict[str, Any]:
         """The manifest and how the run went, in plain JSON types."""
-        return {"ok": self.ok} | self.manifest() | {"worked": self.worked, "seconds": self.seconds, "files": self.files}
+        run = {"worked": self.worked, "seconds": self.seconds, "files": self.files, "reached": self.reached}
+        return {"ok": self.ok} | self.manifest() | run
 
     def as_text(self) -> str:
         """The report as lines of plain text."""
@@ -130,6 +132,9 @@ class IconsReport:
             yield from (f"- {name}: {error}" for name, error in list(self.failed.items())[:LISTED])
         if len(self.failed) > LISTED:
             yield f"- and {len(self.failed) - LISTED} more; the manifest lists them"
+        if self.unfinished:
+            yield f"Not reached: {len(self.unfinished)}."
+        yield from self.reached
         yield from (f"Written: {name}" for name in self.files)
         rate = self.worked / max(self.seconds, 1e-9)
         yield f"Time taken: {self.seconds:.2f} s, {self.worked} pieces of work, {rate:.0f} a second."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
@@ -38,6 +39,8 @@ class IconOptions:
     device : profile name or file. distinct : choose patterns that are not alike. waveforms : write a .wav for each.
     workers : processes, None for one a core. scheduler : address of a dask scheduler to work there instead.
     closer_than : pairs of icons nearer than this are listed. dwell_s : length of a waveform's frame.
+    tol : largest predicted error of an icon that is ok, full scale; None for any. budget_s : seconds for the work on
+        the set; what is not begun then is left for the next run. None for any.
     """
 
     device: str = "paper-6x6"
@@ -49,6 +52,8 @@ class IconOptions:
     contrast_db: float = DEFAULT_CONTRAST_DB
     dwell_s: float = 1.0
     encoding: Encoding = "float32"
+    tol: float | None = None
+    budget_s: float | None = None
 
 
 @dataclass
@@ -67,6 +72,14 @@ class IconRun:
     chosen: dict[str, Pattern] = field(default_factory=dict)
     waves: dict[str, str] = field(default_factory=dict)
     worked: int = 0
+    began: float = field(default_factory=time.monotonic)
+    stopped: bool = False
+
+    def _late(self) -> bool:
+        """Whether no time is left; work was then left undone."""
+        if self.options.budget_s is not None and time.monotonic() - self.began > self.options.budget_s:
+            self.stopped = True
+        return self.stopped
 
     def work(self, pool: Pool) -> None:
         """Do what is not in the journal yet."""
@@ -96,8 +109,11 @@ class IconRun:
 
         for records in self._do(pool, encode_icons, recipe, tasks(), "encoding", len(places), BATCH):
             self.journal.add(*records)
-        for name, key in keys.items():
-            record = self.journal.find(key) or {"bad": self.lost.get(key, "")}
+        for name, key in list(keys.items()):
+            if key not in self.journal and key not in self.lost:
+                del keys[name]
+                continue
+            record = self.journal.find(key) or {"bad": self.lost[key]}
             if "bad" in record:
                 self.failed[name] = record["bad"]
 
@@ -152,6 +168,8 @@ class IconRun:
 
             def missing() -> Iterator[Task]:
                 for task in tasks:
+                    if self._late():
+                        return
                     if task.key in seen or task.key in self.journal:
                         step(False)
                     else:
@@ -198,10 +216,14 @@ class IconRun:
         notes = list(record["notes"])
         if record["frames"] > 1:
             notes.append(f"the first of its {record['frames']} frames")
+        outcome, note, error = plan.get("outcome", "not_planned"), plan.get("note", ""), plan.get("error")
+        tol = self.options.tol
+        if outcome == "ok" and tol is not None and error is not None and error > tol:
+            outcome, note = "unreachable", f"off by {100 * error:.3g} % of full scale, {100 * tol:g} % are allowed."
         return Icon(
             name=name, digest=self.digests[name], kind=record["kind"], pattern=pattern,
             lost=round(best.similarity - pattern.similarity, 6), figure=figure_of(record, self.recipe.shape),
-            outcome=plan.get("outcome", "not_planned"), error=plan.get("error"), note=plan.get("note", ""),
+            outcome=outcome, error=error, note=note,
             notes=tuple(notes), waveform=self.waves.get(name, ""),
         )  # fmt: skip
 
@@ -216,7 +238,21 @@ class IconRun:
             closer_than=self.options.closer_than,
             failed=self.failed,
             unfinished=tuple(place.name for place in self.places if place.name not in known),
-            complete=complete,
+            complete=complete and not self.stopped,
+            reached=self._reached(icons),
             worked=self.worked,
             seconds=seconds,
         )
+
+    def _reached(self, icons: Sequence[Icon]) -> tuple[str, ...]:
+        """Sentences on what was asked for."""
+        lines, options = [], self.options
+        if options.tol is not None:
+            errors = [icon.error for icon in icons if icon.error is not None]
+            good = sum(icon.outcome == "ok" for icon in icons)
+            worst = f"predicted to at most {max(errors):.1e} of full scale, " if errors else ""
+            lines.append(f"Tolerance {options.tol:g}: {worst}{good} of {len(icons)} within it.")
+        if options.budget_s is not None:
+            left = "; what is left is done by the same call again" if self.stopped else ""
+            lines.append(f"Budget {options.budget_s:g} s: {'used up' if self.stopped else 'kept'}{left}.")
+        return tuple(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -11,11 +12,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, fi
 from chainsim import Amplifier, Coupling, Device, Span, load_device, read_model
 from encoders import Fit, Invert, Output, PictureOptions, Presentation, RegionsBy, Style, Threshold, Undefined
 
+from .asked import TOLERANCES
 from .job_texture import NotNegative, Part, Positive, Seconds, TexturePart
 
 __all__ = [
     "SCHEMA",
-    "TOLERANCES",
     "Budget",
     "DevicePart",
     "Item",
@@ -27,9 +28,6 @@ __all__ = [
 ]
 
 SCHEMA = "dotwave/job/1"
-
-TOLERANCES = {"draft": 0.1, "normal": 0.02, "fine": 0.005}
-"""Largest predicted deviation of an actuator from what is wanted, in units of full scale."""
 
 MOST_ACTUATORS_A_SIDE = 1024
 
@@ -84,6 +82,7 @@ class DevicePart(Part):
     coupling: Coupling | None = None
     bias: Literal["none", "actuator"] | None = None
     amplifier: Amplifier | None = None
+    spread: dict[str, float] | None = None
 
     short: ClassVar[str] = "base"
 
@@ -195,8 +194,24 @@ class Item(Part):
         return self
 
 
+def _tolerance(value: Any) -> Any:
+    if isinstance(value, str) and value in TOLERANCES:
+        return value
+    try:
+        # YAML takes 1e-3 for words.
+        number = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise ValueError(f"expected 'draft', 'normal', 'fine' or a number > 0 such as 1e-3, got {value!r}")
+    return number
+
+
+Tolerance = Annotated[Literal["draft", "normal", "fine"] | Annotated[float, Field(gt=0)], BeforeValidator(_tolerance)]
+
+
 class Budget(Part):
-    """Most seconds that planning may take; frames that are not reached then are out_of_budget."""
+    """Most seconds that planning may take (`--budget`); frames that are not reached then are out_of_budget."""
 
     planning_s: Positive
 
@@ -204,20 +219,25 @@ class Budget(Part):
 class Job(Part):
     """A job: what is shown, on what, how exactly, and where it is written.
 
-    Paths are relative to the job file. `tolerance` says how exact a frame must be to be ok (draft, normal and fine:
-    10, 2 and 0.5 % of full scale). `presentation` is for the texts that do not say their own. Without `output`
-    the job is planned only.
+    Paths are relative to the job file. `tolerance` says how exact a frame must be to be ok, as `--tol` does (draft,
+    normal and fine: 10, 2 and 0.5 % of full scale, or a number in units of it). `presentation` is for the texts that
+    do not say their own. Without `output` the job is planned only.
     """
 
     schema_: Literal["dotwave/job/1"] = Field("dotwave/job/1", alias="schema")
     device: DevicePart = DevicePart()
-    tolerance: Literal["draft", "normal", "fine"] = "normal"
+    tolerance: Tolerance = "normal"
     budget: Budget | None = None
     contrast_db: Annotated[float, Field(ge=6, le=60)] = 20.0
     presentation: Presentation = Presentation.TOGETHER
     output: str | None = None
     sample_format: Literal["float32", "pcm24"] = "float32"
     sequence: Annotated[tuple[Item, ...], Field(json_schema_extra={"minItems": 1})]
+
+    @property
+    def tol(self) -> float:
+        """The tolerance as a number, in units of full scale."""
+        return TOLERANCES[self.tolerance] if isinstance(self.tolerance, str) else self.tolerance
 
     @field_validator("sequence")
     @classmethod

@@ -62,8 +62,15 @@ class Bars(Part):
 class Walking(Part):
     """Bars that walk (`encoders.walking_bars`)."""
 
-    width: Annotated[float, Field(ge=1.2, allow_inf_nan=False)]
+    width: Annotated[float, Field(ge=1.2, allow_inf_nan=False)] | None = None
+    rate_hz: Positive | None = None
     level: Level = 1.0
+
+    @model_validator(mode="after")
+    def _one(self) -> Walking:
+        if self.width is None and self.rate_hz is None:
+            raise ValueError("give a width, a rate_hz or both")
+        return self
 
 
 class RegionPart(Part):

@@ -15,6 +15,7 @@ from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 from .progress import progress
 from .report import TextReport
 from .source import text_source
+from .study import Study
 from .tally import PlanStopped, Tally, nearest_lines, peak_volts
 
 __all__ = ["render_text"]
@@ -32,6 +33,7 @@ def render_text(
     encoding: Encoding,
     contrast_db: float = DEFAULT_CONTRAST_DB,
     actuator: tuple[int, int] | None = None,
+    study: Study | None = None,
 ) -> TextReport:
     """Encode text, plan it on a device and, with `out`, write the waveform.
 
@@ -44,6 +46,7 @@ def render_text(
     out : samples (.wav, .npz, .csv, .raw) or a haptic file (.hjif, .ahap, .haptic).
     actuator : (row, col) that an .ahap or .haptic shows; None is the mean over the grid.
     contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
+    study : what is asked beside, and what is seen of the plan.
 
     Raises
     ------
@@ -54,7 +57,8 @@ def render_text(
     profile = load_device(device)
     text = text_source(source)
     scene = encode_text(text, GridShape(profile.rows, profile.cols), options)
-    watch = _Watch(plan_scene(scene, profile, contrast_db=contrast_db), stop_at_failure=out is not None)
+    plan = plan_scene(scene, profile, contrast_db=contrast_db)
+    watch = _Watch(plan, study or Study(), stop_at_failure=out is not None)
     written: WrittenWaveform | None = None
     with progress("rendering") as update:
         try:
@@ -62,7 +66,7 @@ def render_text(
                 for frame in watch:
                     update(frame.end_s)
             else:
-                plan = replace(watch.plan, frames=watch)
+                plan = replace(plan, frames=watch)
                 if out.suffix.lower() in EXCHANGE_SUFFIXES:
                     write_exchange(plan, out, actuator=actuator)
                 else:
@@ -80,6 +84,7 @@ class _Watch:
     """The plan's frames passed through, and what is to be said of them."""
 
     plan: Plan
+    study: Study
     stop_at_failure: bool
     outcomes: dict[str, int] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
@@ -87,12 +92,12 @@ class _Watch:
     failed_number: int = 0
 
     def __iter__(self) -> Iterator[FramePlan]:
-        for number, frame in enumerate(self.plan.frames, 1):
+        for number, frame in enumerate(self.study.watched(self.plan), 1):
             self.outcomes[frame.outcome] = self.outcomes.get(frame.outcome, 0) + (frame.frame is not None)
             self.tally.add(frame)
             if frame.outcome is not Outcome.OK and self.failed is None:
                 self.failed, self.failed_number = frame, number
-                if self.stop_at_failure:
+                if self.stop_at_failure or frame.outcome is Outcome.OUT_OF_BUDGET:
                     raise PlanStopped
             yield frame
 
@@ -115,6 +120,9 @@ def _report(device: Device, scene: TextScene, watch: _Watch, written: WrittenWav
         error=watch.tally.error,
         well=watch.tally.well,
         noise_gain=watch.tally.noise_gain,
+        slew=watch.tally.slew,
+        multiplier=watch.tally.multiplier,
+        spread=watch.tally.spread,
         outcomes=watch.outcomes,
         undefined=_undefined(encoded),
         split=tuple(
@@ -149,6 +157,7 @@ def _notes(device: Device, encoded: EncodingReport, watch: _Watch) -> Iterator[s
     if watch.failed is None:
         return
     yield f"Frame {watch.failed_number}: {watch.failed.note}"
-    yield from nearest_lines(watch.failed, device)
+    if watch.failed.outcome is not Outcome.OUT_OF_BUDGET:
+        yield from nearest_lines(watch.failed, device)
     if watch.stop_at_failure:
         yield "Nothing was written."

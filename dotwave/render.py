@@ -27,10 +27,12 @@ from encoders import (
 )
 from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
+from .asked import TOLERANCES
 from .errors import AppError
-from .job import TOLERANCES, Item, Job, PicturePart, TextPart, read_job
+from .job import Item, Job, PicturePart, TextPart, read_job
 from .progress import progress
 from .scene_report import SceneReport
+from .study import Study
 from .tally import PlanStopped, Tally, nearest_lines, peak_volts
 
 __all__ = ["Rendering", "Shown", "joined", "picture_words", "render_job", "render_scene"]
@@ -50,19 +52,19 @@ class Rendering:
 
     Attributes
     ----------
-    out : the .wav, None to plan only. tolerance : largest predicted error of a frame that is ok, full scale.
-    planning_s : most seconds for planning, None for any.
+    out : the .wav, None to plan only. study : what is asked beside, and what is seen of the plan; for one scene.
     """
 
     out: Path | None = None
     encoding: Encoding = "float32"
     contrast_db: float = DEFAULT_CONTRAST_DB
-    tolerance: float = TOLERANCES["normal"]
-    planning_s: float | None = None
+    study: Study = field(default_factory=Study)
 
 
-def render_job(path: Path, out: Path | None = None) -> SceneReport:
+def render_job(path: Path, out: Path | None = None, study: Study | None = None) -> SceneReport:
     """Carry out the job file `path`; `out` is written in place of the job's own output.
+
+    `study` : what is asked beside, before what the job asks for.
 
     Raises
     ------
@@ -86,10 +88,9 @@ def render_job(path: Path, out: Path | None = None) -> SceneReport:
         out = Path(os.path.normpath(folder / job.output))
         with naming(out.parent):
             out.parent.mkdir(parents=True, exist_ok=True)
-    how = Rendering(
-        out, job.sample_format, job.contrast_db, TOLERANCES[job.tolerance],
-        job.budget.planning_s if job.budget else None,
-    )  # fmt: skip
+    study = study or Study()
+    study.otherwise(job.tol, job.budget.planning_s if job.budget else None)
+    how = Rendering(out, job.sample_format, job.contrast_db, study)
     report = render_scene(joined(parts, shape), device, how, [part.words for part in parts])
     return replace(report, seconds=time.perf_counter() - began)
 
@@ -173,6 +174,7 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
         When the scene does not fit the device, or the disk refuses.
     """
     began = time.perf_counter()
+    how.study.limit = how.study.limit or TOLERANCES["normal"]
     watch = _Watch(plan_scene(scene, device, contrast_db=how.contrast_db), how)
     written: WrittenWaveform | None = None
     with progress("rendering") as update:
@@ -195,7 +197,10 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
         limit_volts=device.amplifier.volts,
         ramp_s=watch.tally.ramp_s,
         error=watch.tally.error,
-        tolerance=how.tolerance,
+        slew=watch.tally.slew,
+        multiplier=watch.tally.multiplier,
+        spread=watch.tally.spread,
+        tolerance=how.study.limit,
         outcomes=watch.outcomes,
         notes=tuple(watch.notes),
         seconds=time.perf_counter() - began,
@@ -213,27 +218,20 @@ class _Watch:
     tally: Tally = field(default_factory=Tally)
 
     def __iter__(self) -> Iterator[FramePlan]:
-        began = time.monotonic()
-        for number, frame in enumerate(self.plan.frames, 1):
-            error = max(state.error for state in frame.states)
-            outcome, note = frame.outcome, frame.note
-            if self.how.planning_s is not None and time.monotonic() - began > self.how.planning_s:
-                outcome = Outcome.OUT_OF_BUDGET
-                note = f"planning took longer than {self.how.planning_s:g} s; give budget.planning_s more."
-            elif outcome is Outcome.OK and error > self.how.tolerance:
-                outcome = Outcome.UNREACHABLE
-                note = f"off by {100 * error:.3g} % of full scale, {100 * self.how.tolerance:g} % are allowed."
-            if frame.frame is not None or outcome is not Outcome.OK:
-                self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
+        for number, frame in enumerate(self.how.study.watched(self.plan), 1):
+            if frame.frame is not None or frame.outcome is not Outcome.OK:
+                self.outcomes[frame.outcome] = self.outcomes.get(frame.outcome, 0) + 1
             self.tally.add(frame)
-            if outcome is not Outcome.OK:
-                self._failed(number, frame, note, outcome)
+            if frame.outcome is not Outcome.OK:
+                self._failed(number, frame)
             yield frame
 
-    def _failed(self, number: int, frame: FramePlan, note: str, outcome: Outcome) -> None:
+    def _failed(self, number: int, frame: FramePlan) -> None:
         if not self.notes:
-            self.notes += [f"Frame {number}: {note}", *nearest_lines(frame, self.plan.device)]
+            self.notes.append(f"Frame {number}: {frame.note}")
+            if frame.outcome is not Outcome.OUT_OF_BUDGET:
+                self.notes += nearest_lines(frame, self.plan.device)
             if self.how.out is not None:
                 self.notes.append("Nothing was written.")
-        if self.how.out is not None or outcome is Outcome.OUT_OF_BUDGET:
+        if self.how.out is not None or frame.outcome is Outcome.OUT_OF_BUDGET:
             raise PlanStopped

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,12 @@ __all__ = [
     "CONTRAST_LIMIT_DB",
     "DOT_THRESHOLD",
     "FrameCheck",
+    "Spreading",
     "TextReport",
     "VerifyReport",
     "contrast_between",
     "decibels",
+    "margin_lines",
     "plain",
 ]
 
@@ -34,6 +36,20 @@ DOT_THRESHOLD = 0.5
 CONTRAST_LIMIT_DB = 12.0
 AMPLITUDE_ERROR_LIMIT = 0.02
 LISTED = 20
+
+
+class Spreading(Protocol):
+    """What a frame becomes under the device's spread, as `planner.FramePlan.spread` has it."""
+
+    @property
+    def expected(self) -> float:
+        """Expected error in units of full scale."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+
+    def lines(self) -> Iterator[str]:
+        """Sentences for a person."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +68,8 @@ class TextReport:
     split : words cut at a page's end. differences : what back-translation does not give again.
     notes : sentences a person should read. seconds : time taken.
     well : largest deflection over the limit of the softening well, noise_gain : largest magnification of
-        disturbances of any pattern (both as in `planner.Margins`).
+        disturbances of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest
+        Floquet multiplier of a wave (all as in `planner.Margins`). spread : of the frame that suffers most.
     """
 
     device: str
@@ -74,6 +91,9 @@ class TextReport:
     seconds: float = 0.0
     well: float = 0.0
     noise_gain: float = 1.0
+    slew: float = 0.0
+    multiplier: float = 0.0
+    spread: Spreading | None = None
 
     @property
     def ok(self) -> bool:
@@ -96,11 +116,14 @@ class TextReport:
         yield f"Deflection: at most {100 * self.well:.0f} % of the softening well's limit."
         if self.noise_gain > 1:
             yield f"Disturbances of the drive: magnified up to {self.noise_gain:.1g} times more than the drive."
+        yield from margin_lines(self.slew, self.multiplier)
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         yield f"Predicted error of the settled patterns: {100 * self.error:.2f} % of full scale."
         if not self.ok:
             counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
             yield f"Not every frame can be made as asked: {counts}."
+        if self.spread is not None:
+            yield from self.spread.lines()
         yield from _section("Characters the table cannot write", self.undefined)
         yield from _section("Words split over a page's end", self.split)
         yield from _section("Differences after back-translation", self.differences)
@@ -267,11 +290,21 @@ def plain(value: object) -> Any:
         return int(value)
     if isinstance(value, FrameCheck):
         return value.as_dict()
+    if hasattr(value, "as_dict"):
+        return plain(value.as_dict())
     if isinstance(value, tuple | list):
         return [plain(item) for item in value]
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     return value
+
+
+def margin_lines(slew: float, multiplier: float) -> Iterator[str]:
+    """Sentences on margins that are only told where something vibrates."""
+    if slew > 0:
+        yield f"Slew of the steady drive: at most {100 * slew:.2g} % of the amplifier's."
+    if multiplier > 0:
+        yield f"Stability: largest Floquet multiplier {multiplier:.3f} (below 1 is stable)."
 
 
 def contrast_between(wanted: NDArray[np.bool_], level: Floats) -> float | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .report import plain
+from .report import Spreading, margin_lines, plain
 
 __all__ = ["SceneReport"]
 
@@ -22,7 +22,7 @@ class SceneReport:
     peak_volts, limit_volts : largest voltage of any channel, and what the amplifier can give.
     ramp_s : longest way into a frame. error : predicted worst deviation, and `tolerance` the largest that is ok, both
         in units of full scale. outcomes : outcome -> number of frames. notes : sentences a person should read.
-    seconds : time taken.
+    seconds : time taken. slew, multiplier, spread : as in `TextReport`.
     """
 
     device: str
@@ -38,6 +38,9 @@ class SceneReport:
     outcomes: Mapping[str, int]
     notes: tuple[str, ...]
     seconds: float
+    slew: float = 0.0
+    multiplier: float = 0.0
+    spread: Spreading | None = None
 
     @property
     def ok(self) -> bool:
@@ -57,9 +60,12 @@ class SceneReport:
         yield from (f"- {part}" for part in self.parts)
         yield f"Duration: {self.duration_s:.2f} s."
         yield f"Peak: {self.peak_volts:.1f} V of {self.limit_volts:g} V."
+        yield from margin_lines(self.slew, self.multiplier)
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         worst = f"{100 * self.error:.2f} % of full scale (at most {100 * self.tolerance:g} % wanted)"
         yield f"Predicted error of the settled patterns: {worst}."
+        if self.spread is not None:
+            yield from self.spread.lines()
         if not self.ok:
             counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
             yield f"Not every frame can be made as asked: {counts}."

@@ -11,6 +11,8 @@ from chainsim import Device
 from drivers import WrittenWaveform
 from planner import FramePlan
 
+from .report import Spreading
+
 __all__ = ["PlanStopped", "Tally", "nearest_lines", "peak_volts"]
 
 
@@ -20,7 +22,10 @@ class PlanStopped(Exception):
 
 @dataclass
 class Tally:
-    """Extremes over the frames passed so far; units as in `planner.FramePlan` and `planner.Margins`."""
+    """Extremes over the frames passed so far; units as in `planner.FramePlan` and `planner.Margins`.
+
+    `spread` is that of the frame with the largest expected error, None where no frame has one.
+    """
 
     duration_s: float = 0.0
     ramp_s: float = 0.0
@@ -28,6 +33,9 @@ class Tally:
     volts: float = 0.0
     well: float = 0.0
     noise_gain: float = 1.0
+    slew: float = 0.0
+    multiplier: float = 0.0
+    spread: Spreading | None = None
 
     def add(self, frame: FramePlan) -> None:
         """Take a frame into account."""
@@ -38,6 +46,10 @@ class Tally:
         self.volts = max(self.volts, *(margin.volts for margin in margins))
         self.well = max(self.well, *(margin.well for margin in margins))
         self.noise_gain = max(self.noise_gain, *(margin.noise_gain for margin in margins))
+        self.slew = max(self.slew, *(margin.slew for margin in margins))
+        self.multiplier = max(self.multiplier, *(margin.multiplier for margin in margins))
+        if frame.spread is not None and (self.spread is None or frame.spread.expected > self.spread.expected):
+            self.spread = frame.spread
 
 
 def peak_volts(written: WrittenWaveform | None, tally: Tally, device: Device) -> float:

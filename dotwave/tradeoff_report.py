@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
@@ -10,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chainsim import Device, load_device
-from encoders import GridShape, Scene, TextOptions, encode_text
+from encoders import GridShape, Scene, TargetPattern, TextOptions, encode_text
 from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
 
+from .asked import FrameAsked, picture_name
 from .errors import AppError
 from .report import plain
 from .source import text_source
@@ -20,27 +20,9 @@ from .source import text_source
 if TYPE_CHECKING:
     from planner import ParetoFront, ParetoPoint, Requirement, Tradeoff, TradeoffRow
 
-__all__ = ["ExplainReport", "ParetoReport", "TradeReport", "explain", "planned", "seconds_of", "trade", "trade_frame"]
-
-UNITS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "": 1.0}
-
-
-def seconds_of(words: str) -> float:
-    """A time such as 50ms, 2 s or 0.5 in seconds.
-
-    Raises
-    ------
-    AppError
-        When it is not one.
-    """
-    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(us|ms|s|)\s*", words)
-    try:
-        number = float(found[1]) if found else 0.0
-    except ValueError:
-        number = 0.0
-    if not (found and 0 < number < 1e9):
-        raise AppError(f"--budget: expected a time above 0 such as 50ms or 2s, got {words!r}")
-    return number * UNITS[found[2]]
+__all__ = [
+    "ExplainReport", "ParetoReport", "TradeReport", "explain", "pareto_report", "planned", "trade", "trade_frame",
+]  # fmt: skip
 
 
 def planned(source: str, device: str | None, *, otherwise: str = "paper-6x6") -> tuple[Scene, Plan]:
@@ -245,25 +227,36 @@ def trade_frame(source: str, *, device: str | None, frame: int, picture: Path | 
     AppError
         When the scene has no such frame.
     """
-    from planner import pareto_of
-
     scene, plan = planned(source, device, otherwise="linked-6x6")
     chosen = next(islice(iter(scene.frames), frame - 1, None), None) if frame > 0 else None
     if chosen is None:
         raise AppError(f"--frame: the scene has no frame {frame}; count from 1")
-    found = pareto_of(chosen.pattern, plan.device)
+    return pareto_report(chosen.pattern, plan.device, FrameAsked(frame, picture))
+
+
+def pareto_report(pattern: TargetPattern, device: Device, asked: FrameAsked) -> ParetoReport:
+    """The Pareto set of a pattern; with a picture, drawn (PNG or SVG).
+
+    Raises
+    ------
+    AppError, PlanError
+        When no way fits the device, or the picture cannot be written.
+    """
+    from planner import pareto_of
+
+    found = pareto_of(pattern, device)
     if not found.points:
-        raise AppError(f"frame {frame}: no way of it fits {plan.device.name}; see `dotwave text` for what is lacking")
+        raise AppError(f"frame {asked.number}: no way fits {device.name}; see `dotwave text` for what is lacking")
+    picture = asked.picture
     if picture is not None:
         from .tradeoff_picture import draw_pareto
 
         _drawn(picture, lambda: draw_pareto(found, picture))
-    return ParetoReport(found, frame, picture)
+    return ParetoReport(found, asked.number, picture)
 
 
 def _drawn(picture: Path, draw: Callable[[], None]) -> None:
-    if picture.suffix.lower() not in (".png", ".svg"):
-        raise AppError(f"{picture}: expected a picture name that ends with .png or .svg")
+    picture_name(picture)
     try:
         draw()
     except OSError as error:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, GridIntegrator
+from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
 from encoders import back_check, covered_text, read_cells
 
@@ -47,6 +47,8 @@ class Felt(NamedTuple):
 
 def verify(path: Path) -> VerifyReport:
     """Integrate the device's full equations under the samples of `path` and say what is felt.
+
+    Actuators that were measured are what they were measured to be.
 
     Reads the samples and the manifest beside them, nothing else.
 
@@ -84,14 +86,8 @@ class _Integration:
         device = manifest.device
         self._manifest, self._device = manifest, device
         self.block = max(256, BLOCK_VALUES // (device.rows * device.cols))
-        self._grid = GridIntegrator(
-            shape=(device.rows, device.cols),
-            chain_length=device.chain_length,
-            delta=device.delta,
-            beta=device.beta,
-            ring=device.coupling.closure is Closure.RING,
-            dtau=device.tau_per_s / manifest.rate_hz,
-        )
+        self._built = AsBuilt(device)
+        self._grid = self._built.integrator(manifest.rate_hz)
         self._fits = [_Fit(device, mark, manifest.rate_hz) for mark in manifest.frames]
         self._first = 0
         self.position = 0
@@ -102,9 +98,11 @@ class _Integration:
         index = np.arange(self.position, self.position + len(volts))
         force = np.zeros((len(volts), device.rows, device.cols))
         for channel in manifest.channels:
-            per_volt = device.epsilon_per_volt if channel.role is Role.DRIVE else device.bias_per_volt
-            force[:, channel.row, channel.col or 0] += volts[:, channel.index] * per_volt
-        z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz))
+            row, col = channel.row, channel.col or 0
+            driven = channel.role is Role.DRIVE
+            per_volt = self._built.drive_per_volt[row, col] if driven else device.bias_per_volt
+            force[:, row, col] += volts[:, channel.index] * per_volt
+        z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz) * self._built.lam_gain)
         for fit in self._fits[self._first :]:
             if fit.first > index[-1]:
                 break

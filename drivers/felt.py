@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, GridIntegrator
+from chainsim import AsBuilt, Device
 
 from .channels import Role, channels_of
 from .playout import OutputBlock
@@ -32,23 +32,19 @@ class FeltGrid:
         self._channels = channels_of(device)
         self._keep = max(8, math.ceil(PERIODS * rate_hz / device.f0_hz))
         self._recent: Floats = np.zeros((self._keep, device.rows, device.cols))
-        self._grid = GridIntegrator(
-            shape=(device.rows, device.cols),
-            chain_length=device.chain_length,
-            delta=device.delta,
-            beta=device.beta,
-            ring=device.coupling.closure is Closure.RING,
-            dtau=device.tau_per_s / rate_hz,
-        )
+        self._built = AsBuilt(device)
+        self._grid = self._built.integrator(rate_hz)
 
     def take(self, block: OutputBlock) -> None:
         """Move through the samples of `block`."""
         device = self._device
         force = np.zeros((len(block.volts), device.rows, device.cols))
         for channel in self._channels:
-            per_volt = device.epsilon_per_volt if channel.role is Role.DRIVE else device.bias_per_volt
-            force[:, channel.row, channel.col or 0] += block.volts[:, channel.index] * per_volt
-        z = self._grid.advance(force, block.lam)
+            row, col = channel.row, channel.col or 0
+            driven = channel.role is Role.DRIVE
+            per_volt = self._built.drive_per_volt[row, col] if driven else device.bias_per_volt
+            force[:, row, col] += block.volts[:, channel.index] * per_volt
+        z = self._grid.advance(force, block.lam * self._built.lam_gain)
         self._recent = np.concatenate([self._recent, z])[-self._keep :]
 
     def levels(self) -> Floats:

@@ -257,6 +257,8 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
             if moving[index] and any(np.any(state.bias) for state in row):
                 raise WaveformError(f"frame {number}, row {index}: some of its chains vibrate and some stand still")
         mark["moving"] = moving
+    if frame.spread is not None:
+        mark["spread"] = frame.spread.as_dict()
     return mark
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -31,9 +32,16 @@ class PatternKind(StrEnum):
 
 @dataclass(frozen=True)
 class WalkingBars:
-    """Bars that walk along the rows: two tones that beat; `width` of a bar in actuators."""
+    """Bars that walk along the rows: two tones that beat.
+
+    Attributes
+    ----------
+    width : of a bar in actuators, NaN where it may follow from the rate.
+    rate_hz : bars that pass an actuator in a second, NaN where the rate may follow from the width.
+    """
 
     width: float
+    rate_hz: float = math.nan
 
 
 @dataclass(frozen=True)

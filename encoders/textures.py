@@ -59,21 +59,33 @@ def bars(
     return _target(grid, PatternKind.BARS)
 
 
-def walking_bars(shape: GridShape, *, width: float, level: float = 1.0) -> TargetPattern:
+def walking_bars(
+    shape: GridShape, *, width: float | None = None, rate_hz: float | None = None, level: float = 1.0
+) -> TargetPattern:
     """Vertical bars that walk: two tones whose lags differ by pi/width beat with bars `width` actuators wide.
 
-    The rate at which they walk follows from the device (physics: f0 delta tan(pi / 2 width) for equal unit
-    gains); the plan says it.
+    On coupled chains width and rate hang together (physics: the rate is f0 delta tan(pi / 2 width) for equal unit
+    gains): give one of them. Single actuators take both.
+
+    Parameters
+    ----------
+    rate_hz : bars that pass an actuator in a second.
 
     Raises
     ------
     TextureError
-        When the width is below 1.2 (lags beyond 165 degrees) or the level is not in (0, 1].
+        When neither is given, the width is below 1.2 (lags beyond 165 degrees), the rate is not above 0, or the level
+        is not in (0, 1].
     """
-    if not (math.isfinite(width) and width >= 1.2):
+    if width is None and rate_hz is None:
+        raise TextureError("walking bars: expected a width, a rate or both")
+    if width is not None and not (math.isfinite(width) and width >= 1.2):
         raise TextureError(f"walking bars: expected a width of at least 1.2 actuators, got {width}")
+    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise TextureError(f"walking bars: expected a rate above 0 Hz, got {rate_hz}")
     grid = np.full((shape.rows, shape.cols), _level(level))
-    return _target(grid, PatternKind.BARS, walking=WalkingBars(width))
+    walking = WalkingBars(math.nan if width is None else width, math.nan if rate_hz is None else rate_hz)
+    return _target(grid, PatternKind.BARS, walking=walking)
 
 
 def levels(amplitude: ArrayLike) -> TargetPattern:

@@ -12,6 +12,7 @@ from .scene_plan import DEFAULT_CONTRAST_DB, plan_scene
 if TYPE_CHECKING:
     from .calibration import ChainFit, Sweep, SweepError, fit_chain
     from .climbing import climb
+    from .outlook import FrameSpread, TradePoint
     from .pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
     from .questions import Question, TradeoffError, questions_of, seconds_words
     from .requirement import Requirement, RequirementError, Term, require
@@ -29,6 +30,7 @@ __all__ = [
     "ContrastError",
     "DwellTooShort",
     "FramePlan",
+    "FrameSpread",
     "Held",
     "HigherMode",
     "Margins",
@@ -53,6 +55,7 @@ __all__ = [
     "Term",
     "Tone",
     "ToneRamp",
+    "TradePoint",
     "TradeRow",
     "Tradeoff",
     "TradeoffError",
@@ -77,6 +80,8 @@ __all__ = [
 ]
 
 _LATE = {
+    "TradePoint": "outlook",
+    "FrameSpread": "outlook",
     "pareto_of": "pareto",
     "front_of": "pareto",
     "ParetoPoint": "pareto",

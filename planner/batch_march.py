@@ -126,9 +126,12 @@ def _amplitude2(linear: Complexes, cubic: Floats, push: Floats, near: tuple[Comp
         s = 1 / 3 + np.where(several, 2 * root * np.cos(angle), single + third / single)
         s = _polished(s, p, q)
         if near is not None:
-            # The angle after next gives the smallest root: the largest amplitude, also stable, if all three are > 0.
-            high = _polished(1 / 3 + 2 * root * np.cos(angle + 2 * np.pi / 3), p, q)
-            there = several & (high > 0) & (p < 0)
+            # The smallest root is the largest amplitude, also stable, if all three are > 0: of what is left of the
+            # cubic without the largest, s^2 + b s + c, with no difference of nearly equal numbers.
+            b, c = (p + q / s) / s, q / s
+            inside = b**2 - 4 * c
+            high = 2 * c / (np.sqrt(np.maximum(inside, 0.0)) - b)
+            there = (inside >= 0) & (b < 0) & (c > 0)
             s = np.where(there & _closer(linear, cubic, push**2 / modulus2, high, s, near), high, s)
     return np.asarray(push**2 / modulus2 / s)
 

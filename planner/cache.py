@@ -11,7 +11,7 @@ import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import fields
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,9 @@ from .plan import ChainState, Margins, Ramp, Tone, ToneRamp
 __all__ = ["PlanCache", "cache_path"]
 
 log = logging.getLogger(__name__)
+
+# SQLite takes at least 999 values in one question.
+ASKED_AT_ONCE = 500
 
 
 def cache_path() -> Path:
@@ -51,7 +54,8 @@ class PlanCache:
     finds anything: it says so once in the log, and planning goes on.
     """
 
-    def __init__(self, device: Device, contrast_db: float) -> None:
+    def __init__(self, device: Device, contrast_db: float, whole: PlanCache | None = None) -> None:
+        """`whole` : of the device that `device` is one chain of; on its file, and with all it depends on."""
         profile = device.as_dict()
         for words in ("name", "description", "notes"):
             profile.pop(words)
@@ -59,14 +63,16 @@ class PlanCache:
         self._scope = hashlib.sha256(_code_digest() + text.encode()).digest()
         self._connection: sqlite3.Connection | None = None
         self._damaged = False
+        if whole is not None:
+            self._scope = hashlib.sha256(whole._scope + self._scope).digest()
+            self._connection = whole._connection
+            return
         try:
             path = cache_path()
             path.parent.mkdir(parents=True, exist_ok=True)
             self._connection = sqlite3.connect(path, timeout=2.0, isolation_level=None, check_same_thread=False)
             self._connection.execute("PRAGMA synchronous = OFF")
-            self._connection.execute(
-                "CREATE TABLE IF NOT EXISTS plans (key BLOB PRIMARY KEY, value BLOB) WITHOUT ROWID"
-            )
+            self._connection.execute("CREATE TABLE IF NOT EXISTS plans (key BLOB PRIMARY KEY, value BLOB)")
         except (OSError, sqlite3.Error) as error:
             self._give_up(error)
 
@@ -84,17 +90,18 @@ class PlanCache:
         if self._connection is None:
             return [None] * len(items)
         try:
-            with closing(self._connection.cursor()) as cursor:
-                rows = [
-                    cursor.execute("SELECT value FROM plans WHERE key = ?", (self._key(item),)).fetchone()
-                    for item in items
-                ]
-            return [None if row is None else self._sound(item, row[0]) for item, row in zip(items, rows, strict=True)]
+            keys, rows = [self._key(item) for item in items], dict[bytes, object]()
+            for start in range(0, len(keys), ASKED_AT_ONCE):
+                part = keys[start : start + ASKED_AT_ONCE]
+                marks = ", ".join("?" * len(part))
+                with closing(self._connection.cursor()) as cursor:
+                    rows.update(cursor.execute(f"SELECT key, value FROM plans WHERE key IN ({marks})", part))
+            return [self._sound(key, rows[key]) if key in rows else None for key in keys]
         except sqlite3.Error as error:
             self._give_up(error)
             return [None] * len(items)
 
-    def _sound(self, item: bytes, raw: object) -> ChainState | Ramp | None:
+    def _sound(self, key: bytes, raw: object) -> ChainState | Ramp | None:
         """What a row holds; a damaged one is deleted, so that it is planned and kept again."""
         try:
             if not isinstance(raw, bytes):
@@ -105,7 +112,7 @@ class PlanCache:
                 log.warning("plan cache %s: damaged plans (%s) are made again", cache_path(), error)
             self._damaged = True
             if self._connection is not None:
-                self._connection.execute("DELETE FROM plans WHERE key = ?", (self._key(item),))
+                self._connection.execute("DELETE FROM plans WHERE key = ?", (key,))
             return None
 
     def keep(self, items: Iterable[tuple[bytes, ChainState | Ramp]]) -> None:
@@ -124,14 +131,33 @@ class PlanCache:
 
 
 def _packed(value: ChainState | Ramp) -> bytes:
-    """Plain values as a line of JSON, then the arrays; no pickle."""
+    """Plain values as a line of JSON, then the arrays as NPY; no pickle."""
     arrays: list[np.ndarray[Any, Any]] = []
     plain = _plain(value, arrays)
-    out = io.BytesIO()
-    out.write(json.dumps(plain).encode() + b"\n")
+    parts = [json.dumps(plain).encode(), b"\n"]
     for array in arrays:
-        np.save(out, array, allow_pickle=False)
+        parts += [_header(array.dtype.str, array.shape), array.tobytes()]
+    return b"".join(parts)
+
+
+@lru_cache(maxsize=256)
+def _header(descr: str, shape: tuple[int, ...]) -> bytes:
+    """What an NPY file begins with; worked out once, since writing it takes longer than most arrays."""
+    out = io.BytesIO()
+    np.lib.format.write_array_header_1_0(out, {"descr": descr, "fortran_order": False, "shape": shape})
     return out.getvalue()
+
+
+@lru_cache(maxsize=256)
+def _empty(header: bytes) -> np.ndarray[Any, Any]:
+    """An array of the kind that an NPY file's beginning speaks of."""
+    source = io.BytesIO(header)
+    if np.lib.format.read_magic(source) != (1, 0):
+        raise ValueError("an array of another format")
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(source)
+    if fortran or dtype.kind not in "fcib":
+        raise ValueError(f"an array of {dtype}")
+    return np.empty(shape, dtype)
 
 
 _PARTS = {kind.__name__: kind for kind in (ChainState, Margins, Ramp, Tone, ToneRamp)}
@@ -151,13 +177,16 @@ def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
 
 
 def _unpacked(raw: bytes) -> ChainState | Ramp:
-    source = io.BytesIO(raw)
-    plain = json.loads(source.readline())
-    # Arrays lie in the order of their numbers.
-    arrays = []
-    while source.tell() < len(raw):
-        arrays.append(np.load(source, allow_pickle=False))
-        arrays[-1].flags.writeable = False
+    at = raw.index(b"\n") + 1
+    plain = json.loads(raw[:at])
+    # Arrays lie in the order of their numbers; bytes 8 and 9 of each say how long its header is.
+    arrays: list[np.ndarray[Any, Any]] = []
+    while at < len(raw):
+        begin = at + 10 + int.from_bytes(raw[at + 8 : at + 10], "little")
+        kind = _empty(raw[at:begin])
+        at = begin + kind.nbytes
+        array = np.frombuffer(raw[begin:at], kind.dtype).reshape(kind.shape)
+        arrays.append(array)
     value = _whole(plain, arrays)
     if not isinstance(value, ChainState | Ramp):
         raise ValueError("neither a state nor a ramp")

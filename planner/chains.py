@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
 from .cache import PlanCache
+from .held import Held
 from .joining import as_tone, joined, rest_for, turned_ramp, turned_state
 from .plan import ChainState, Margins, Ramp
 from .strategy import Strategy, strategy_for
@@ -24,13 +24,6 @@ Floats = NDArray[np.float64]
 
 # Kept in memory of each: all 64 x 64 ramps of a chain of six would fit.
 MOST_RAMPS = MOST_STATES = 4096
-
-
-class Held(NamedTuple):
-    """What a chain holds: a wish as bytes (of amplitudes alone, or of a `ChainWish`), and its turn in radians."""
-
-    key: bytes
-    turn: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -49,10 +42,11 @@ class _Pair:
 class Chains:
     """What the chains of a device do for patterns."""
 
-    def __init__(self, device: Device, contrast_db: float) -> None:
+    def __init__(self, device: Device, contrast_db: float, whole: Chains | None = None, kind: int = 0) -> None:
+        """`whole` : the chains of the device that `device` is one chain of, of this `kind`."""
         self.device = device
-        self._contrast_db = contrast_db
-        self._cache = PlanCache(device, contrast_db)
+        self._contrast_db, self._whole, self._kind = contrast_db, whole, kind
+        self._cache: PlanCache = PlanCache(device, contrast_db, None if whole is None else whole._cache)
         self._states: dict[bytes, ChainState] = {}
         self._turned: dict[Held, ChainState] = {}
         self._ramps: dict[_Pair, Ramp | None] = {}
@@ -62,12 +56,18 @@ class Chains:
     @cached_property
     def strategy(self) -> Strategy | None:
         """The way to make amplitudes at will; None where the device has none."""
-        return strategy_for(self.device, self._contrast_db)
+        whole = None if self._whole is None else self._whole.strategy
+        return strategy_for(self.device, self._contrast_db, whole=whole)
 
     @property
     def rest(self) -> Held:
         """What a chain holds that has nothing to do."""
-        return Held(bytes(8 * self.device.chain_length))
+        return Held(bytes(8 * self.device.chain_length), kind=self._kind)
+
+    @property
+    def at_rest(self) -> list[Held]:
+        """All chains of the device at rest."""
+        return [self.rest] * (self.device.rows * self.device.chains_per_row)
 
     def hold(self, pattern: TargetPattern, before: list[Held]) -> list[Held]:
         """What chains hold for a pattern, given what they held."""
@@ -78,7 +78,7 @@ class Chains:
 
     def _hold(self, wish: Turned, before: Held) -> Held:
         if isinstance(wish.wish, ChainWish):
-            return Held(wish.wish.key, wish.turn)
+            return Held(wish.wish.key, wish.turn, self._kind)
         started = ChainWish.of_key(before.key) is None and any(before.key)
         ask = (wish.wish.tobytes(), started)
         if ask not in self._wishes:
@@ -86,7 +86,7 @@ class Chains:
                 self._wishes.clear()
             self._wishes[ask] = self._wished(wish.wish, started)
         key = self._wishes[ask]
-        return Held(key, wish.turn if any(key) else 0.0)
+        return Held(key, wish.turn if any(key) else 0.0, self._kind)
 
     def _wished(self, amplitude: Floats, started: bool) -> bytes:
         if self.strategy is not None:
@@ -113,7 +113,7 @@ class Chains:
     def under(self, held: Held, lam: float) -> Held:
         """What is held, with its links given."""
         wish = ChainWish.of_key(held.key)
-        return held if wish is None else Held(replace(wish, lam=lam).key, held.turn)
+        return held if wish is None else held._replace(key=replace(wish, lam=lam).key)
 
     def _plan(self, keys: list[bytes]) -> None:
         wanted = list(dict.fromkeys(keys))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 
 import numpy as np
@@ -15,13 +16,16 @@ __all__ = ["climb"]
 
 # The next rung or tolerance takes up to so many times the last one's time.
 GROWTH = 10.0
+# Seconds that the full equations take before the first step, where nothing compiled was used before.
+COLD_S = 3.0
 
 
 def climb(question: Question, *, tol: float | None = None, budget_s: float | None = None) -> tuple[Response, str]:
     """The cheapest answer whose own estimate meets `tol`, or the best that comes within `budget_s`, and what it is.
 
     Rungs are tried from the cheapest; nothing is compared with a reference. A rung that has begun is not stopped: the
-    next one is tried only when ten times what the last one took is left of the time.
+    next one is tried only when ten times what the last one took is left of the time, and the full equations only when
+    there is time to load what is compiled for them.
 
     Raises
     ------
@@ -34,7 +38,7 @@ def climb(question: Question, *, tol: float | None = None, budget_s: float | Non
     began, best, last = time.perf_counter(), None, 0.0
     for rung, asked in _ladder(question, tol):
         start = time.perf_counter()
-        if best is not None and budget_s is not None and start - began + GROWTH * last > budget_s:
+        if best is not None and budget_s is not None and start - began + GROWTH * last + _loading_s(rung) > budget_s:
             break
         found = answer(rung, asked, question)
         last = time.perf_counter() - start
@@ -48,6 +52,10 @@ def climb(question: Question, *, tol: float | None = None, budget_s: float | Non
     wish = f"tolerance {tol:g}" if tol is not None else f"budget {seconds_words(budget_s or 0.0)}"
     verdict = "met" if met else "not met"
     return best, f"{best.rung} to about {reached:.1e} in {seconds_words(spent)}; {wish} {verdict}"
+
+
+def _loading_s(rung: str) -> float:
+    return COLD_S if rung == "ode" and "numba" not in sys.modules else 0.0
 
 
 def _estimate(found: Response) -> float:

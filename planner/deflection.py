@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Outcome, Setting, solve
 
 from . import jets
+from .links import stages
 from .margins import WELL_SHARE
 from .plan import ChainState, Margins, Ramp
 from .strategy import Strategy
@@ -41,13 +42,20 @@ class Deflection(Strategy):
 
     def _bias(self, z: Floats, force: Floats) -> Floats:
         """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
-        device = self.device
-        lam = device.coupling.lam.min
-        before = np.roll(z, 1, axis=-1)
-        links = np.full(z.shape[-1], lam)
-        if device.coupling.closure is Closure.OPEN:
+        before, own = np.roll(z, 1, axis=-1), stages(self.device.chain)
+        links = self._links.copy()
+        if self.device.coupling.closure is Closure.OPEN:
             links[0] = 0.0
-        return np.asarray(force + z + device.beta * z**3 - links * (before - z))
+        return np.asarray(force + own.stiffness * z + own.beta * z**3 - links * (before - z))
+
+    @property
+    def _links(self) -> Floats:
+        """What the links into each actuator make of the smallest lam; the first of a ring closes it."""
+        device = self.device
+        links = np.full(device.chain_length, device.coupling.lam.min)
+        if device.actuators and device.rows * device.chains_per_row == 1:
+            links[1:] *= device.lam_gain(0)
+        return links
 
     def states(self, targets: Floats) -> list[ChainState]:
         """Static settings for `targets`, checked by the static solver."""
@@ -56,9 +64,10 @@ class Deflection(Strategy):
         step = device.amplifier.volt_step * device.bias_per_volt
         if step:
             biases = step * np.rint(biases / step)
-        lam = np.full(device.chain_length - 1, device.coupling.lam.min)
-        setting = Setting.of(device.chain, epsilon=0.0, lam=device.coupling.lam.min, omega=1.0, bias=biases)
-        rung = "static" if device.coupling.closure is Closure.OPEN else "auto"
+        ring = device.coupling.closure is Closure.RING
+        lam, links = self._links[1:], self._links if ring else self._links[1:]
+        setting = Setting.of(device.chain, epsilon=0.0, lam=links if len(links) else 0.0, omega=1.0, bias=biases)
+        rung = "auto" if ring else "static"
         response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
         error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
         return [
@@ -79,10 +88,12 @@ class Deflection(Strategy):
         ]
 
     def _margins(self, bias: Floats) -> Margins:
-        largest = float(np.abs(bias).max())
-        beta = self.device.beta
-        fold = 2 / (3 * math.sqrt(3 * -beta)) if beta < 0 else math.inf
-        return Margins(volts=largest / self.device.bias_max, well=largest / fold)
+        own = stages(self.device.chain)
+        soft = np.minimum(own.beta, 0.0)
+        with np.errstate(divide="ignore"):
+            fold = 2 * np.power(own.stiffness, 1.5) / (3 * np.sqrt(3 * -soft))
+        volts = float(np.abs(bias).max()) / self.device.bias_max
+        return Margins(volts=volts, well=float((np.abs(bias) / fold).max()))
 
     def _outcome(self, solved: Outcome, target: Floats, bias: Floats) -> Outcome:
         return Outcome.UNREACHABLE if solved is Outcome.OK and self._lacking(target, bias) else solved
@@ -93,7 +104,8 @@ class Deflection(Strategy):
             share = f"{100 * margins.volts:.0f} % of the amplifier's volts"
             return f"it takes {share}; it lacks volts, or a lower full_scale"
         # Past the fold the bias that balances a deflection falls again, but nothing stable stands there.
-        stiffness = 1.0 + device.coupling.lam.min + 3 * device.beta * (target * device.full_scale) ** 2
+        own = stages(device.chain)
+        stiffness = own.stiffness + device.coupling.lam.min + 3 * own.beta * (target * device.full_scale) ** 2
         if np.any(stiffness <= 0):
             return "it lies beyond the fold of the softening well; it lacks depth of the well, or a lower full_scale"
         if margins.well > WELL_SHARE:
@@ -120,8 +132,9 @@ class Deflection(Strategy):
                 continue
             z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))
             z = z + one.target * self.device.full_scale
-            bias = self._bias(z, push + self.device.delta * speed)
-            linear = self._bias(speed, jerk + self.device.delta * push)
-            slope = linear + self.device.beta * (3 * z**2 * speed - speed**3)
+            own = stages(self.device.chain)
+            bias = self._bias(z, push + own.delta * speed)
+            linear = self._bias(speed, jerk + own.delta * push)
+            slope = linear + own.beta * (3 * z**2 * speed - speed**3)
             out.append(Ramp(t_s=x, bias=bias, bias_slope=slope * self.device.tau_per_s))
         return out

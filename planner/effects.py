@@ -180,12 +180,21 @@ class StandingChain:
         return found
 
     def pulled(self, row_lam: float, above: StandingChain) -> list[Complexes]:
-        """What links from the chain above do; lines of other frequencies than its own only stiffen it."""
+        """What links from the chain above do; lines of other frequencies than its own only stiffen it.
+
+        A chain at rest is moved along by every line of the one above; all in step.
+        """
+        if self.scale == 0:
+            moved = (self._moved_along(row_lam, line) for line in above.lines)
+            return [np.asarray(sum(moved, np.zeros(self.chain.n)) + 0j)]
         found = []
         for line in self.lines:
             same = [other.phasor for other in above.lines if other.omega == line.omega]
             found.append(self.moved(line, row_lam * ((same[0] if same else 0.0) - line.phasor)))
         return found
+
+    def _moved_along(self, row_lam: float, line: Line) -> Floats:
+        return np.asarray(np.abs(np.linalg.solve(self.impedance(line.omega, row_lam), row_lam * line.phasor)))
 
     def through_amplifier(self, bandwidth: float, slew: float) -> list[Complexes]:
         """What an amplifier of that bandwidth (over f0) and a drive at `slew` of its fastest change do."""

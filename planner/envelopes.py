@@ -9,7 +9,7 @@ on Taylor jets over P ramps at once: shape (K, P, nodes).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,22 @@ from numpy.typing import NDArray
 from chainsim import Chain
 
 from . import jets
-from .links import links_for
+from .blending import blended
+from .jets import Jet
+from .links import links_for, stages
+from .resample import chebyshev_points, converged, resampled
 
 __all__ = ["ROUGHEST", "SMOOTHEST", "EnvelopeRamp", "change", "fall", "rise"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-Jet = NDArray[Any]
 
 # Smoothness of the blends. Rougher ones leave a residue that later stages magnify, smoother ones are
 # steeper in the middle; these were the best of C^5..C^13 under the full equations.
 ROUGHEST = 9
 SMOOTHEST = 11
+# Points at which the links and the drive of most changes are known to nine digits.
+POINTS = 97
 
 
 @dataclass(frozen=True)
@@ -52,19 +56,29 @@ class EnvelopeRamp:
 
 
 def _blend(duration: float, nodes: int, n: int, order: int) -> Floats:
-    length = 2 * n + 2
-    scale = duration ** -np.arange(length, dtype=np.float64)
-    return jets.smoothstep(order, nodes, length) * scale[:, None]
+    return _timed(jets.smoothstep(order, nodes, 2 * n + 2), duration)
 
 
-def _force(chain: Chain, omega: float, envelope: Jet, modulus2: Jet) -> Jet:
+@cache
+def _at_points(n: int) -> Floats:
+    """The blend at Chebyshev's points over [0, 1]."""
+    return jets.smoothstep_at(ROUGHEST, chebyshev_points(POINTS), 2 * n + 2)
+
+
+def _timed(blend: Floats, duration: float) -> Floats:
+    """A jet over [0, 1] as one over `duration` in tau."""
+    return np.asarray(blend * (duration ** -np.arange(len(blend), dtype=np.float64))[:, None])
+
+
+def _force(chain: Chain, m: int, omega: float, envelope: Jet, modulus2: Jet) -> Jet:
     """G_m, two orders shorter than the envelope."""
+    own = stages(chain, m)
     first = jets.derivative(envelope)
     second = jets.derivative(first)
     length = len(second)
-    stiffness = 0.75 * chain.beta * modulus2[:length] + 0j
-    stiffness[0] += 1.0 - omega**2 + 1j * chain.delta * omega
-    return jets.multiply(stiffness, envelope[:length]) + (2j * omega + chain.delta) * first[:length] + second
+    stiffness = 0.75 * own.beta * modulus2[:length] + 0j
+    stiffness[0] += own.stiffness - omega**2 + 1j * own.delta * omega
+    return jets.multiply(stiffness, envelope[:length]) + (2j * omega + own.delta) * first[:length] + second
 
 
 def rise(chain: Chain, amplitude: Floats, omega: float, duration: float, nodes: int) -> EnvelopeRamp:
@@ -100,7 +114,7 @@ def _flat(chain: Chain, amplitude: Floats, omega: float, blend: Floats) -> Envel
     peak = np.empty((count, n))
     for m in range(n - 1, -1, -1):
         peak[:, m] = np.abs(envelope[0]).max(axis=1)
-        force = _force(chain, omega, envelope, jets.norm2(envelope))
+        force = _force(chain, m, omega, envelope, jets.norm2(envelope))
         if m:
             envelope = force / links[:, m - 1, None] + envelope[: len(force)]
     nodes = blend.shape[1]
@@ -113,7 +127,8 @@ def _steady_phasor(chain: Chain, amplitude: Floats, links: Floats, omega: float)
     phasor = np.empty(amplitude.shape, dtype=np.complex128)
     phasor[:, -1] = amplitude[:, -1]
     for m in range(amplitude.shape[1] - 1, 0, -1):
-        kappa = 1.0 - omega**2 + 1j * chain.delta * omega + 0.75 * chain.beta * amplitude[:, m] ** 2
+        own = stages(chain, m)
+        kappa = own.stiffness - omega**2 + 1j * own.delta * omega + 0.75 * own.beta * amplitude[:, m] ** 2
         phasor[:, m - 1] = phasor[:, m] * (1.0 + kappa / links[:, m - 1])
     return phasor
 
@@ -121,8 +136,8 @@ def _steady_phasor(chain: Chain, amplitude: Floats, links: Floats, omega: float)
 def change(chain: Chain, before: Floats, after: Floats, omega: float, duration: float, nodes: int) -> EnvelopeRamp:
     """From amplitude profiles to others without passing silence, with links that vary in time.
 
-    Every modulus follows a blend of its old and new value; then ``A_{m-1} = A_m + mu G_m`` with
-    ``|G|^2 mu^2 + 2 Re(A conj(G)) mu + |A|^2 - r_{m-1}^2 = 0``, mu = 1/lam_m(tau).
+    Every modulus follows a blend of its old and new value; links and drive follow from it (`blending`). They are
+    worked out at `POINTS` of Chebyshev's where these describe them, else at every node.
 
     Parameters
     ----------
@@ -130,34 +145,18 @@ def change(chain: Chain, before: Floats, after: Floats, omega: float, duration: 
     duration : in tau.
     """
     count, n = before.shape
-    blend = _blend(duration, nodes, n, ROUGHEST)
-    modulus = (after - before).T[:, None, :, None] * blend[None, :, None, :]
-    modulus[:, 0] += before.T[:, :, None]
-    lam = np.empty((count, nodes, n - 1))
-    slope = np.empty_like(lam)
-    possible = np.ones(count, dtype=np.bool_)
-    envelope: Jet = modulus[-1] + 0j
-    for m in range(n - 1, -1, -1):
-        squared = jets.multiply(modulus[m], modulus[m])
-        force = _force(chain, omega, envelope, squared)
-        if m:
-            here = envelope[: len(force)]
-            gap = squared - jets.multiply(modulus[m - 1], modulus[m - 1])
-            mu, feasible = _link(here, force, gap)
-            possible &= feasible
-            lam[:, :, m - 1] = 1.0 / mu[0]
-            slope[:, :, m - 1] = -mu[1] / mu[0] ** 2
-            envelope = here + jets.multiply(mu + 0j, force)
-    peak = np.maximum(before, after)
-    return EnvelopeRamp(force[0], force[1], lam, slope, peak, possible)
-
-
-def _link(envelope: Jet, force: Jet, gap: Jet) -> tuple[Jet, NDArray[np.bool_]]:
-    """mu = 1/lam as a jet (the root that joins the steady links at both ends), and where it exists."""
-    size = jets.norm2(force)
-    along = jets.product_real(envelope, force)
-    inside = jets.multiply(along, along) - jets.multiply(size, gap)
-    feasible = np.all(inside[0] > 0, axis=1)
-    inside[:, ~feasible] = 0.0
-    inside[0, ~feasible] = 1.0
-    return jets.divide(jets.square_root(inside) - along, size), feasible
+    drive, lam, slope = np.empty((count, nodes, 4)), np.empty((count, nodes, n - 1)), np.empty((count, nodes, n - 1))
+    possible, rest = np.ones(count, dtype=np.bool_), np.arange(count)
+    if nodes > POINTS:
+        few = blended(chain, before, after, omega, _timed(_at_points(n), duration))
+        good = few.possible & converged(np.concatenate([few.drive[:, :, :2], few.lam], axis=2))
+        # One by one: products this small are done by one core, which others at work do not hold up.
+        drive[good], lam[good], slope[good] = (
+            resampled(curves[good], nodes) for curves in (few.drive, few.lam, few.slope)
+        )
+        rest = np.flatnonzero(~good)
+    if len(rest):
+        every = blended(chain, before[rest], after[rest], omega, _blend(duration, nodes, n, ROUGHEST))
+        drive[rest], lam[rest], slope[rest], possible[rest] = every.drive, every.lam, every.slope, every.possible
+    epsilon, epsilon_slope = (drive[:, :, part] + 1j * drive[:, :, part + 1] for part in (0, 2))
+    return EnvelopeRamp(epsilon, epsilon_slope, lam, slope, np.maximum(before, after), possible)

@@ -23,6 +23,8 @@ END = 10.0
 SHARES = np.array([1.0, 0.5, 0.25, 0.1, 0.03])
 # The end is met when it is missed by less than this, relative to the largest amplitude.
 MET = 1e-5
+# From here on a step that only meets the end is tried too: where the way curves much, the cost's steps go astray.
+CLOSE = 0.02
 # Keeps a step finite along directions that cost nothing.
 RIDGE = 1e-9
 
@@ -52,11 +54,18 @@ class Slopes:
 
     def step(self, end: Floats) -> Floats:
         """The change of the unknowns that moves the end by -`end` at the least cost."""
+        return self._solved(end, -self.cost_slope.T @ self.cost)
+
+    def least_step(self, end: Floats) -> Floats:
+        """The change that does so with the least change of movement: nothing else is improved by it."""
+        return self._solved(end, np.zeros(self.end_slope.shape[1]))
+
+    def _solved(self, end: Floats, descent: Floats) -> Floats:
         size, rows = self.end_slope.shape[1], len(self.end)
         system = np.zeros((size + rows, size + rows))
         system[:size, :size] = self.cost_slope.T @ self.cost_slope + RIDGE * np.eye(size)
         system[size:, :size], system[:size, size:] = self.end_slope, self.end_slope.T
-        right = np.concatenate([-self.cost_slope.T @ self.cost, -end])
+        right = np.concatenate([descent, -end])
         try:
             return np.asarray(np.linalg.solve(system, right)[:size])
         except np.linalg.LinAlgError:
@@ -83,6 +92,8 @@ def steer(task: Steering, unknowns: Floats, softness: float, most: int) -> Steer
         if missed < MET:
             return Steered(unknowns, missed, count)
         tried = unknowns + SHARES[:, None] * slopes.step(slopes.end)
+        if missed < CLOSE:
+            tried = np.vstack([tried, unknowns + slopes.least_step(slopes.end)])
         end, cost = task.misses(tried, softness)
         with np.errstate(all="ignore"):
             merit = END * np.abs(end).max(axis=1) + 0.5 * np.sum(cost**2, axis=1)

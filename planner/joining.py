@@ -132,10 +132,14 @@ def _links(first: Ramp, second: Ramp, before: ChainState, after: ChainState) -> 
     times, links = [], []
     # Links that jump where the ramps meet do so in an instant, not at one: a curve has one value at a time.
     for ramp, held, start in ((first, before, 0.0), (second, after, first.duration_s)):
-        still = ramp.lam is None or ramp.lam_t_s is None
-        ends = np.array([0.0, ramp.duration_s])
-        times.append(start + (ends if still or ramp.lam_t_s is None else ramp.lam_t_s))
+        at, lam = np.array([0.0, ramp.duration_s]), np.repeat(held.lam[None, :], 2, axis=0)
+        if ramp.lam is not None and ramp.lam_t_s is not None:
+            # They stay through a rest behind the way.
+            rests = ramp.lam_t_s[-1] < ramp.duration_s
+            at = np.append(ramp.lam_t_s, ramp.duration_s) if rests else ramp.lam_t_s
+            lam = np.vstack([ramp.lam, ramp.lam[-1:]]) if rests else ramp.lam
+        times.append(start + at)
         if start:
             times[-1][0] += INSTANT_S
-        links.append(np.repeat(held.lam[None, :], 2, axis=0) if still or ramp.lam is None else ramp.lam)
+        links.append(lam)
     return np.concatenate(times), np.concatenate(links)

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain
 
-__all__ = ["detuning_gain", "drive_for", "links_for", "stage_constant"]
+__all__ = ["Stage", "detuning_gain", "drive_for", "links_for", "stage_constant", "stages"]
 
 Floats = NDArray[np.float64]
 
 
-def stage_constant(chain: Chain, amplitude: Floats, omega: float) -> Floats:
-    """kappa_m = 1 - omega^2 + (3/4) beta a_m^2 of physics.md section 2 (one harmonic)."""
-    return 1.0 - omega**2 + 0.75 * chain.beta * amplitude**2
+class Stage(NamedTuple):
+    """Natural frequency squared, damping and cubic term of oscillators: a number for all, or one for each."""
+
+    stiffness: Floats | float
+    delta: Floats | float
+    beta: Floats | float
+
+
+def stages(chain: Chain, part: slice | int = slice(None)) -> Stage:
+    """Those of `part` of a chain."""
+    if chain.spread is None:
+        return Stage(1.0, chain.delta, chain.beta)
+    return Stage(chain.stiffness[part], chain.deltas[part], chain.betas[part])
+
+
+def stage_constant(chain: Chain, amplitude: Floats, omega: float, part: slice | int = slice(None)) -> Floats:
+    """kappa_m = 1 - omega^2 + (3/4) beta a_m^2 of physics.md section 2 (one harmonic), the 1 its own stiffness.
+
+    `part` : which oscillators the last axis of `amplitude` stands for.
+    """
+    own = stages(chain, part)
+    return np.asarray(own.stiffness - omega**2 + 0.75 * own.beta * amplitude**2)
 
 
 def links_for(chain: Chain, amplitude: Floats, omega: float) -> Floats:
@@ -32,8 +53,9 @@ def links_for(chain: Chain, amplitude: Floats, omega: float) -> Floats:
     float64, shape (..., n-1); NaN where no link can make the step.
     """
     before, here = amplitude[..., :-1], amplitude[..., 1:]
-    kappa = stage_constant(chain, here, omega)
-    stiffness2 = kappa**2 + (chain.delta * omega) ** 2
+    later = slice(1, None)
+    kappa = stage_constant(chain, here, omega, later)
+    stiffness2 = kappa**2 + (stages(chain, later).delta * omega) ** 2
     # In mu = 1/lam: stiffness2 mu^2 + 2 kappa mu + 1 - (a_{m-1}/a_m)^2 = 0; the larger root.
     inside = kappa**2 - stiffness2 * (1.0 - (before / here) ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -43,8 +65,8 @@ def links_for(chain: Chain, amplitude: Floats, omega: float) -> Floats:
 
 def drive_for(chain: Chain, amplitude: Floats, omega: float) -> Floats:
     """Drive amplitude epsilon = a_1 |kappa_1 + i delta omega|; `amplitude` is the first actuator's."""
-    kappa = stage_constant(chain, amplitude, omega)
-    return np.asarray(amplitude * np.hypot(kappa, chain.delta * omega))
+    kappa = stage_constant(chain, amplitude, omega, 0)
+    return np.asarray(amplitude * np.hypot(kappa, stages(chain, 0).delta * omega))
 
 
 def detuning_gain(chain: Chain, amplitude: Floats, lam: Floats, omega: float) -> Floats:
@@ -63,9 +85,10 @@ def detuning_gain(chain: Chain, amplitude: Floats, lam: Floats, omega: float) ->
     float64, shape (P,).
     """
     open_end = np.zeros((len(amplitude), 1))
-    stiffness = 1.0 + np.concatenate([open_end, lam], axis=1)
-    at = np.sqrt(stiffness - chain.delta**2 / 2)[:, :, None]
-    stage = np.abs(stiffness[:, None, :] - at**2 + 1j * chain.delta * at)
+    own = stages(chain)
+    stiffness = own.stiffness + np.concatenate([open_end, lam], axis=1)
+    at = np.sqrt(stiffness - own.delta**2 / 2)[:, :, None]
+    stage = np.abs(stiffness[:, None, :] - at**2 + 1j * own.delta * at)
     forward = np.concatenate([open_end + 1.0, lam], axis=1)
     gains = np.cumprod(forward[:, None, :] / stage, axis=2)
     standing = (amplitude / drive_for(chain, amplitude[:, :1], omega))[:, None, :]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device, Response
 
 from .fit import Hold
+from .links import stages
 from .plan import Margins
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
@@ -53,10 +54,11 @@ def converter_error(device: Device, hold: Hold) -> float:
     lam = np.concatenate([[0.0], hold.lam])
     if device.coupling.closure is Closure.RING:
         lam[0] = lam[1]
-    stiffness = 1.0 + lam
+    own = stages(device.chain)
+    stiffness = own.stiffness + lam
     low, high = (float(np.sqrt(end(stiffness))) for end in (np.min, np.max))
     omega = np.linspace(max(low - WIDTHS * device.delta, 0.05), high + WIDTHS * device.delta, POINTS)
-    stage = stiffness[:, None] - omega**2 + 1j * device.delta * omega
+    stage = stiffness[:, None] - omega**2 + 1j * np.multiply.outer(own.delta, omega)
     forward = np.concatenate([[1.0], lam[1:]])
     gain = np.abs(np.cumprod(forward[:, None] / stage, axis=0)) ** 2
     if device.coupling.closure is Closure.RING:

@@ -7,9 +7,7 @@ and way in are tried in the full equations from rest, so that the error is that 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +17,9 @@ from encoders import TargetPattern
 
 from .effects import Line, StandingChain
 from .envelopes import EnvelopeRamp, change, rise
-from .errors import PlanError
 from .floor import LOWER, idle_profiles
 from .links import detuning_gain, links_for
-from .spread import Spread
+from .pareto_point import SIGMA, ParetoError, ParetoFront, ParetoPoint, front_of
 from .way_check import Way
 
 __all__ = ["ParetoError", "ParetoFront", "ParetoPoint", "front_of", "pareto_of"]
@@ -36,115 +33,54 @@ NODES = 251
 SAMPLES_PER_PERIOD = 64
 # Periods after the way in over which the pattern is looked at.
 LOOKED_AT = 12
-SIGMA = Spread(f0=0.01)
-# Differences below this share, or this size (time, drive, error, spread, gain), are none: a front of measured numbers
-# would otherwise keep everything.
-ALIKE = 0.02
-RESOLUTION = np.array([0.0, 1e-3, 1e-3, 1e-3, 0.0])
 WELL_SHARE = 0.8
 
 
-class ParetoError(PlanError, ValueError):
-    """A frame cannot be traded.
-
-    Examples: a wave, whose phases fix the frequency; a device of one lam per chain; nothing that is felt.
-    """
-
-
-@dataclass(frozen=True)
-class ParetoPoint:
-    """One way to make a frame.
-
-    Attributes
-    ----------
-    omega : drive frequency over f0. ramp_s : length of the way in.
-    contrast_db : of raised and unraised dots; infinite where unraised ones rest.
-    error : worst deviation from the wish after the way in, unraised dots included, in units of full scale.
-    made : the same from what the settings were made for, with the unraised dots at their level.
-    drive : peak of the drive on the way and after it, over the amplifier's. noise_gain : as in `Margins`.
-    spread : deviation that 1 % spread (1 sigma) of the natural frequencies makes at the worst actuator, full scale.
-    """
-
-    omega: float
-    ramp_s: float
-    contrast_db: float
-    error: float
-    made: float
-    drive: float
-    noise_gain: float
-    spread: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types; null where not finite."""
-        return {name: value if math.isfinite(value) else None for name, value in vars(self).items()}
-
-
-@dataclass(frozen=True)
-class ParetoFront:
-    """The points no other beats in everything, the quickest first, of `tried`; `unfit` were beyond the limits."""
-
-    device: str
-    points: tuple[ParetoPoint, ...]
-    tried: int
-    unfit: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
-        return {
-            "device": self.device, "tried": self.tried, "unfit": self.unfit,
-            "points": [point.as_dict() for point in self.points],
-        }  # fmt: skip
-
-
-def front_of(points: Sequence[ParetoPoint]) -> tuple[ParetoPoint, ...]:
-    """Those that none is as good as in everything, but for `ALIKE` and `RESOLUTION`; the quickest first."""
-    # In this order no later point can be better in everything than an earlier one.
-    costs = sorted(
-        ((one.ramp_s, one.drive, one.error, one.spread, one.noise_gain), at) for at, one in enumerate(points)
-    )
-    kept: list[tuple[Floats, int]] = []
-    for cost, at in costs:
-        here = (1 + ALIKE) * np.array(cost) + RESOLUTION
-        if not any(np.all(other <= here) for other, _ in kept):
-            kept.append((np.array(cost), at))
-    return tuple(points[at] for _, at in kept)
-
-
 def pareto_of(pattern: TargetPattern, device: Device) -> ParetoFront:
-    """Trade one frame of amplitudes on a device of programmable links, or of actuators on their own.
+    """Trade one frame on a device: amplitudes by vibration, deflections held by biases, or waves.
 
     Raises
     ------
     ParetoError
-        When the frame's phases matter, the device has no lam per link, or nothing is felt.
+        When bars walk in it, nothing is felt, or the device has nothing to trade for it.
     """
-    wishes = _wishes(pattern, device)
+    if device.actuators:
+        raise ParetoError("device: its actuators were measured one by one; give the profile they were built to")
+    if pattern.walking is not None:
+        raise ParetoError("frame: bars that walk are two tones of one length of way; give amplitudes or a wave")
+    amplitudes = np.unique(np.abs(pattern.amplitude).reshape(-1, device.chain_length), axis=0)
+    wishes: Floats = amplitudes[amplitudes.any(axis=1)]
+    if not len(wishes):
+        raise ParetoError("frame: nothing is felt in it; give one with a raised dot")
+    linked = device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN
+    if pattern.phase_matters and device.chain_length > 1:
+        from .pareto_waves import ways_of_waves
+
+        points, tried = ways_of_waves(pattern, device)
+    elif device.bias == "actuator":
+        from .pareto_still import ways_of_deflections
+
+        points, tried = ways_of_deflections(wishes, device)
+    elif linked or device.chain_length == 1:
+        points, tried = _ways_of_vibrations(wishes, device)
+    else:
+        raise ParetoError(
+            f"device: {device.name} has nothing to trade for amplitudes; give one with a bias per actuator or a lam "
+            "per link, such as paper-6x6 or linked-6x6"
+        )
+    return ParetoFront(device.name, front_of(points), tried, tried - len(points))
+
+
+def _ways_of_vibrations(wishes: Floats, device: Device) -> tuple[list[ParetoPoint], int]:
+    """Those within the limits, over frequency, contrast and length, and how many were tried."""
     contrasts = CONTRASTS_DB if device.chain_length > 1 else (math.inf,)
     points: list[ParetoPoint] = []
     tried = 0
     for omega in np.linspace(device.omega.min, device.omega.max, OMEGAS):
-        made = [_Candidates.of(device, wishes, float(omega), contrast) for contrast in contrasts]
-        for one in made:
+        for made in [_Candidates.of(device, wishes, float(omega), contrast) for contrast in contrasts]:
             tried += len(RAMPS_S)
-            points += one.points() if one is not None else []
-    return ParetoFront(device.name, front_of(points), tried, tried - len(points))
-
-
-def _wishes(pattern: TargetPattern, device: Device) -> Floats:
-    """Distinct amplitudes wished of chains that are not to rest; float64, shape (P, n)."""
-    if pattern.phase_matters or pattern.walking is not None:
-        raise ParetoError("frame: its phases are part of the wish and fix the frequency; give a frame of amplitudes")
-    linked = device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN
-    if not (linked or device.chain_length == 1) or device.bias == "actuator":
-        raise ParetoError(
-            f"device: {device.name} has nothing to trade for amplitudes; give one with a lam per link and no bias, "
-            "such as linked-6x6"
-        )
-    wishes = np.unique(np.abs(pattern.amplitude).reshape(-1, device.chain_length), axis=0)
-    wishes = wishes[wishes.any(axis=1)]
-    if not len(wishes):
-        raise ParetoError("frame: nothing is felt in it; give one with a raised dot")
-    return np.asarray(wishes)
+            points += made.points() if made is not None else []
+    return points, tried
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import Frame
 
+from .outlook import FrameSpread
+
 __all__ = ["ChainState", "FramePlan", "Margins", "Plan", "Ramp", "Tone", "ToneRamp"]
 
 Floats = NDArray[np.float64]
@@ -60,6 +62,9 @@ class Tone:
 @dataclass(frozen=True)
 class ChainState:
     """What one chain of n actuators holds while a frame stands.
+
+    Drive and links are what the device is set to, in the units of its profile; what actuators and links that were
+    measured make of them, the device says.
 
     Attributes
     ----------
@@ -151,7 +156,8 @@ class FramePlan:
 
     `states` and `ramps` go row by row, chain by chain (rows * chains_per_row of them); a ramp of None
     means the chain already stands. `frame` is None for the way out after the last frame.
-    `note` is one sentence when the outcome is not ok.
+    `note` is one sentence when the outcome is not ok. `spread` is what the frame becomes under the device's spread,
+    where it has one and the frame can be made.
     """
 
     frame: Frame | None
@@ -162,6 +168,7 @@ class FramePlan:
     ramps: tuple[Ramp | None, ...]
     outcome: Outcome = Outcome.OK
     note: str = ""
+    spread: FrameSpread | None = None
 
 
 @dataclass(frozen=True)

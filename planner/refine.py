@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, gradient, solve
 
-from .links import drive_for, links_for
+from .links import links_for, stages
 
 __all__ = ["Refined", "refine"]
 
@@ -19,6 +19,8 @@ Complexes = NDArray[np.complex128]
 # Relative to the profile's largest amplitude: far below what is asked of a plan, well above round-off.
 GOAL = 1e-9
 STEPS = 6
+# Sweeps along the chain that the closed form takes to know the third harmonic's part: each is a thousand times better.
+SWEEPS = 2
 # The largest share of a setting by which one step may change it: farther away the gradient says nothing.
 LONGEST_STEP = 0.5
 
@@ -49,8 +51,7 @@ def refine(chain: Chain, amplitude: Floats, omega: float) -> Refined:
     ----------
     amplitude : float64, shape (P, n), dimensionless, > 0, for which `links_for` has an answer.
     """
-    epsilon: Floats = drive_for(chain, amplitude[:, 0], omega)
-    lam = links_for(chain, amplitude, omega)
+    epsilon, lam = _with_third(chain, amplitude, omega)
     scale = amplitude.max(axis=1)
     for _ in range(STEPS):
         setting = Setting.of(chain, epsilon=epsilon, lam=lam, omega=omega)
@@ -70,6 +71,44 @@ def refine(chain: Chain, amplitude: Floats, omega: float) -> Refined:
     outcome = response.outcome.copy()
     outcome[(outcome == Outcome.OK) & ~(worst <= 100 * GOAL * scale)] = Outcome.NO_CONVERGENCE
     return Refined((epsilon * turn).astype(np.complex128), lam, response.phasor * turn[:, None], worst, outcome)
+
+
+def _with_third(chain: Chain, amplitude: Floats, omega: float) -> tuple[Floats, Floats]:
+    """Drives and links in closed form, the third harmonic C with them.
+
+    ``(kappa_m + lam_m + 3 i delta omega - 8 omega^2 + (3/4) beta a_m^2) C_m = lam_m C_{m-1} - (beta/4) A_m^3``, and
+    back on the first harmonic: ``kappa_m + (3/4) beta (conj(A_m)^2 C_m/A_m + 2 |C_m|^2)`` in place of kappa_m.
+    """
+    links = links_for(chain, amplitude, omega)
+    stage = [_own(chain, m, amplitude[:, m], omega) for m in range(chain.n)]
+    for _ in range(SWEEPS):
+        before: Complexes = np.zeros(len(amplitude), dtype=np.complex128)
+        third, phasor, found = before, before, []
+        for m in range(chain.n):
+            a, beta = amplitude[:, m], 0.75 * stages(chain, m).beta
+            lam = links[:, m - 1] if m else np.zeros(len(a))
+            phasor = np.asarray(a * np.exp(1j * np.angle(phasor / (stage[m] + lam))) if m else a + 0j)
+            stiff = stage[m].real + 3j * stage[m].imag - 8 * omega**2 + beta * a**2 + lam
+            third = (lam * third - beta / 3 * phasor**3) / stiff
+            back = np.conj(phasor) ** 2 * third / phasor + 2 * np.abs(third) ** 2
+            stage[m] = _own(chain, m, a, omega) + beta * back
+            if m:
+                found.append(_link(stage[m], amplitude[:, m - 1] / a, lam))
+        links = np.array(found).T.reshape(links.shape)
+    return amplitude[:, 0] * np.abs(stage[0]), links
+
+
+def _own(chain: Chain, m: int, amplitude: Floats, omega: float) -> Complexes:
+    """kappa_m + i delta omega of one harmonic."""
+    own = stages(chain, m)
+    return np.asarray(own.stiffness - omega**2 + 0.75 * own.beta * amplitude**2 + 1j * own.delta * omega)
+
+
+def _link(stage: Complexes, ratio: Floats, otherwise: Floats) -> Floats:
+    """The link under which ``|1 + stage/lam|`` is `ratio`: of two the smaller, as `links_for` has it."""
+    size = np.abs(stage) ** 2
+    soft = np.sqrt(np.maximum(stage.real**2 + size * (ratio**2 - 1), 0.0)) - stage.real
+    return np.where(soft > 0, size / np.where(soft > 0, soft, 1.0), otherwise)
 
 
 def _step(jacobian: Floats, deviation: Floats, present: Floats) -> Floats:

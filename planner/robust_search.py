@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Chain, Device
 
 from .batch_march import Motion, Parts, march
-from .spread import Draws, Spread, SpreadReport, Wish, draw, judge
+from .spread import Draws, Spread, SpreadError, SpreadReport, Wish, draw, judge
 
 __all__ = ["Held", "Search", "TradeRow", "Trial"]
 
@@ -93,10 +93,15 @@ class TradeRow:
 
 
 class Search:
-    """Settings of one chain, judged and improved under one spread."""
+    """Settings of one chain, judged and improved under one spread.
 
-    def __init__(self, device: Device, trial: Trial, spread: Spread) -> None:
-        self.device, self.trial, chain = device, trial, trial.chain
+    `copies` : how many chains such as this one stand side by side; it is the error of the worst that counts.
+    """
+
+    def __init__(self, device: Device, trial: Trial, spread: Spread, copies: int = 1) -> None:
+        self.device, self.trial, self.copies, chain = device, trial, copies, trial.chain
+        if not chain.feed_forward:
+            raise SpreadError(f"robust: settings are searched for in open chains, got {chain.closure}")
         one_sided = draw(chain.n, count=FITTED, seed=trial.seed).normal
         both = Draws(np.concatenate([one_sided, -one_sided], axis=-1))
         self.fitted = both.parts(chain, spread)
@@ -104,12 +109,15 @@ class Search:
         self.judged = draw(chain.n, count=trial.count, seed=trial.seed + 1).parts(chain, spread)
         self.exact = draw(chain.n, count=1, seed=trial.seed).parts(chain, Spread())
         self.tied = device.coupling.scope in {"fixed", "device", "chain"}
+        one = device.rows * device.chains_per_row == 1
+        # What each link makes of the lam it is set to; settings here are what links make.
+        self.gain = device.lam_gain(0) if one else np.ones(chain.n - 1)
 
     def fits(self, held: Held) -> bool:
         """Whether the device can set it."""
         device, allowed = self.device, self.device.coupling.lam
         in_band = device.omega.min <= held.omega <= device.omega.max
-        linked = bool(np.all((held.lam >= allowed.min) & (held.lam <= allowed.max)))
+        linked = bool(np.all((held.lam >= allowed.min * self.gain) & (held.lam <= allowed.max * self.gain)))
         return in_band and linked and held.epsilon <= device.epsilon_max
 
     def row(self, held: Held) -> TradeRow:
@@ -134,12 +142,27 @@ class Search:
         lam = np.concatenate([[0.0], held.lam])[:, None, None]
         return march(parts, force, lam, held.omega)
 
-    def least(self, start: Held, *, free_omega: bool) -> Held:
+    def worst_of(self, error: Floats) -> float:
+        """The expected error of the worst of the copies, from errors of one over draws, float64, shape (count,)."""
+        return float(self._shares(error) @ error)
+
+    def _shares(self, error: Floats) -> Floats:
+        """How likely each draw is that of the worst copy."""
+        count = len(error)
+        if self.copies == 1:
+            return np.full(count, 1 / count)
+        shares = np.empty(count)
+        shares[np.argsort(error)] = np.diff((np.arange(count + 1) / count) ** self.copies)
+        return shares
+
+    def least(self, start: Held, *, free_omega: bool, free_lam: bool = True) -> Held:
         """The setting with the least expected error near `start`, within what the device can set."""
         from scipy.optimize import minimize
 
         low, top = self._bounds(start, free_omega)
         first = np.clip(self._logs(start), low, top)
+        if not free_lam:
+            low[1:-1] = top[1:-1] = first[1:-1]
         first = min(first, np.clip(self._aimed(first, start), low, top), key=lambda x: self._expected(x, start)[0])
         with warnings.catch_warnings():
             # The search may leave its bounds by a rounding, says so, and goes back.
@@ -149,14 +172,16 @@ class Search:
                 bounds=list(zip(low, top, strict=True)), options={"maxiter": ITERATIONS, "ftol": ENOUGH},
             )  # fmt: skip
         last = np.clip(found.x, low, top)
-        return self._held(min(first, last, key=lambda x: self._expected(x, start)[0]), start)
+        best = self._held(min(first, last, key=lambda x: self._expected(x, start)[0]), start)
+        # Logarithms do not give back exactly what they were given.
+        return best if free_lam else replace(best, lam=start.lam)
 
     def _bounds(self, start: Held, free_omega: bool) -> tuple[Floats, Floats]:
         """What the device can set: logarithms of drive and links, and the frequency."""
         device, span = self.device, self.device.coupling.lam
-        links = len(self._logs(start)) - 2
-        top = np.log([device.epsilon_max, *([span.max] * links)])
-        low = np.log(np.maximum([0.0, *([span.min] * links)], np.exp(top) * SMALLEST))
+        gain = self.gain[: len(self._logs(start)) - 2]
+        top = np.log([device.epsilon_max, *(span.max * gain)])
+        low = np.log(np.maximum([0.0, *(span.min * gain)], np.exp(top) * SMALLEST))
         band = (device.omega.min, device.omega.max) if free_omega else (start.omega, start.omega)
         return np.append(low, band[0]), np.append(top, band[1])
 
@@ -183,7 +208,9 @@ class Search:
         worst = np.argmax(np.abs(deviation), axis=0)[None]
         error = np.take_along_axis(deviation, worst, axis=0)
         at_worst = np.take_along_axis(slopes, worst[:, None], axis=0)[0] * np.sign(error)
-        return float(np.abs(error).mean()), at_worst.mean(axis=(1, 2))
+        size = np.abs(error).ravel()
+        shares = self._shares(size)
+        return float(shares @ size), at_worst.reshape(len(at_worst), -1) @ shares
 
     def _judged(self, parts: Parts, x: Floats, like: Held) -> tuple[Floats, Floats]:
         """Deviations, shape (n, 1, draws), and their derivatives by `x`, shape (n, D, 1, draws)."""

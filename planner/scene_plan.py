@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from chainsim import Device, Outcome
 from encoders import Frame, Scene
@@ -13,6 +14,9 @@ from .chains import Chains
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
 from .frame_change import Change, change_to
 from .plan import ChainState, FramePlan, Plan
+
+if TYPE_CHECKING:
+    from .expected import Expectation
 
 __all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
 
@@ -44,28 +48,41 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CON
     return Plan(device, _Frames(scene, device, contrast_db), scene.encoding)
 
 
+def _chains_of(device: Device, contrast_db: float) -> Chains:
+    if not device.actuators:
+        return Chains(device, contrast_db)
+    from .unequal import UnequalChains
+
+    return UnequalChains(device, contrast_db)
+
+
 class _Frames:
     """The planned frames of a scene, as often as they are asked for."""
 
     def __init__(self, scene: Scene, device: Device, contrast_db: float) -> None:
         self._scene = scene
-        self._chains = Chains(device, contrast_db)
+        self._chains = _chains_of(device, contrast_db)
         self._device = device
+        self._expected: Expectation | None = None
+        if device.spread is not None:
+            from .expected import Expectation
+
+            self._expected = Expectation(device)
 
     def __iter__(self) -> Iterator[FramePlan]:
         device, chains = self._device, self._chains
         rate = device.amplifier.rate_hz
-        held = [chains.rest] * (device.rows * device.chains_per_row)
+        held = chains.at_rest
         position = 0
         for frame in self._scene.frames:
             change = change_to(chains, held, chains.hold(frame.pattern, held))
             # What cannot be held is not played, and the next frame begins at rest.
             played = all(state.outcome is Outcome.OK for state in change.states)
-            held = change.held if played else [chains.rest] * len(held)
+            held = change.held if played else chains.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
             position += samples
-        change = change_to(chains, held, [chains.rest] * len(held))
+        change = change_to(chains, held, chains.at_rest)
         if any(ramp is not None for ramp in change.ramps):
             longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
             yield self._frame(None, position, int(longest * rate) + 2, change)
@@ -77,10 +94,12 @@ class _Frames:
         if longest >= end_s - start_s:
             raise DwellTooShort(
                 f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
-                f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell)"
+                f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
-        whole = FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps)
-        return self._judged(whole)
+        whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
+        if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
+            return whole
+        return replace(whole, spread=self._expected.of(change.held, change.states))
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:

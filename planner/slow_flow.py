@@ -29,24 +29,26 @@ class Course:
     ----------
     epsilon, epsilon_slope : complex128, shape (2 N + 1, P), P drive envelopes and their derivatives in tau.
     lam, lam_slope : float64, shape (2 N + 1, n), the links, the same for all P; ``lam[:, 0]`` is 0.
+    lent : float64, shape (2 N + 1, n), squares of amplitudes whose stiffness is lent where the flow is linear.
     """
 
     epsilon: Complexes
     epsilon_slope: Complexes
     lam: Floats
     lam_slope: Floats
+    lent: Floats
 
 
 def follow_course(
-    chain: Chain, omega: float, duration: float, course: Course, held: Complexes, softness: float
+    chain: Chain, omega: float, duration: float, course: Course, start: Complexes, softness: float
 ) -> Complexes:
-    """Amplitudes on the way from rest, by Runge and Kutta's fourth-order steps.
+    """Amplitudes on the way, by Runge and Kutta's fourth-order steps.
 
     Parameters
     ----------
-    duration : in tau.
-    held : complex128, shape (n,), amplitudes at the end, whose stiffness is taken instead of the momentary one to the
-        part 1 - `softness`: at 0 the flow is linear and has the same end, at 1 it is the chain's.
+    duration : in tau. start : complex128, shape (n,), amplitudes to begin with.
+    softness : at 1 the stiffness is the chain's, at 0 what is lent instead: the flow is then linear and, if what is
+        lent is its amplitude there, stands at the same end.
 
     Returns
     -------
@@ -54,14 +56,13 @@ def follow_course(
     """
     damping = 2j * omega + chain.delta
     cubic, quintic = softness * 0.75 * chain.beta, softness * 3 / 128 * chain.beta**2
-    final = np.abs(held[:, None]) ** 2
-    lent = (1 - softness) * final * (0.75 * chain.beta + 3 / 128 * chain.beta**2 * final)
+    lent = (1 - softness) * course.lent * (0.75 * chain.beta + 3 / 128 * chain.beta**2 * course.lent)
     still = 1.0 - omega**2 + 1j * chain.delta * omega + lent
 
     def slope(at: int, here: Complexes) -> Complexes:
         lam, lam_slope = course.lam[at, :, None], course.lam_slope[at, :, None]
         square = here.real**2 + here.imag**2
-        stiff = (still + lam) + square * (cubic + quintic * square)
+        stiff = (still[at, :, None] + lam) + square * (cubic + quintic * square)
         force = np.empty_like(here)
         force[0], force[1:] = course.epsilon[at], lam[1:] * here[:-1]
         first = (force - stiff * here) / damping
@@ -73,7 +74,7 @@ def follow_course(
 
     steps = (len(course.lam) - 1) // 2
     h = duration / steps
-    here = np.zeros((len(held), course.epsilon.shape[1]), dtype=np.complex128)
+    here = np.repeat(start[:, None], course.epsilon.shape[1], axis=1)
     trace = np.empty((steps + 1, *here.shape), dtype=np.complex128)
     trace[0] = here
     for k in range(steps):

@@ -15,7 +15,7 @@ from chainsim import Closure, Device, GridIntegrator
 
 from .plan import Ramp, Tone, ToneRamp
 
-__all__ = ["Sounding", "slow_fall", "slow_rise"]
+__all__ = ["SAMPLES", "STAYS", "Sounding", "felt_envelope", "slow_fall", "slow_rise"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -96,23 +96,24 @@ def _settled(device: Device, held: Sounding, rise: float, tolerance: float) -> f
         force[:, 0, 0] += size * (tone.epsilon * np.exp(1j * tone.omega * tau)).real * (half / math.sin(half)) ** 2
     lam = np.concatenate([held.lam[:1], held.lam])[None, :]
     ring = device.coupling.closure is Closure.RING
+    chain = device.chain
     grid = GridIntegrator(
-        shape=(1, device.chain_length), chain_length=device.chain_length, delta=device.delta, beta=device.beta,
+        shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
         ring=ring, dtau=dtau,
     )  # fmt: skip
     z = grid.advance(force, lam)[:, 0]
-    felt = _envelope(z, omega, tau)
+    felt = felt_envelope(z, omega, tau)
     wanted = np.zeros_like(z)
     for tone in held.tones:
         wanted += (np.exp(1j * tone.omega * tau)[:, None] * tone.phasor).real
     scale = sum(float(np.abs(tone.phasor).max()) for tone in held.tones)
-    away = np.abs(np.subtract(felt, _envelope(wanted, omega, tau))).max(axis=1)
+    away = np.abs(np.subtract(felt, felt_envelope(wanted, omega, tau))).max(axis=1)
     bad = np.flatnonzero(~(away <= tolerance * scale))
     last = int(bad[-1]) + 1 if len(bad) else 0
     return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
 
 
-def _envelope(z: Floats, omega: float, tau: Floats) -> Complexes:
+def felt_envelope(z: Floats, omega: float, tau: Floats) -> Complexes:
     """First harmonic in each period; complex128, shape (periods, n)."""
     turned = z * np.exp(-1j * omega * tau)[:, None]
     return np.asarray(2 * turned.reshape(-1, SAMPLES, z.shape[1]).mean(axis=1))

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Device
+from chainsim import Chain, Closure, Device
 
 from .batch_march import Motion, Parts, march
 from .errors import PlanError
 from .plan import ChainState
 
 __all__ = [
+    "THRESHOLD",
+    "TOLERANCE",
     "Draws",
     "Spread",
     "SpreadError",
     "SpreadReport",
     "Wish",
+    "centre_of",
     "draw",
+    "drawn_in",
     "judge",
+    "known_spread",
     "motion_of",
     "spread_of",
     "wish_of",
@@ -29,6 +35,10 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+
+# Largest error that counts as made, and the level that parts dots from no dots, in units of full scale.
+TOLERANCE, THRESHOLD = 0.2, 0.5
 
 
 class SpreadError(PlanError, ValueError):
@@ -67,6 +77,12 @@ class Spread:
         return Spread(self.f0 * factor, self.delta * factor, self.beta * factor, self.lam * factor)
 
 
+def known_spread(device: Device) -> Spread:
+    """What the profile says of its actuators' spread; none where it says nothing."""
+    told = device.spread
+    return Spread() if told is None else Spread(told.frequency, told.damping, told.beta, told.lam)
+
+
 @dataclass(frozen=True)
 class Draws:
     """Standard normal numbers, one for each actuator and what it differs in; the same draws serve every spread.
@@ -76,8 +92,10 @@ class Draws:
 
     normal: Floats
 
-    def parts(self, chain: Chain, spread: Spread) -> Parts:
+    def parts(self, chain: Chain, spread: Spread, gain: Floats | None = None) -> Parts:
         """The chains drawn, around the numbers of `chain`: arrays of shape (n, chains, count).
+
+        `gain` : float64, shape (n-1,), what links make of the lam they are set to, where that is known.
 
         A factor of f0, delta or lam is ``1 + sigma x``; one that would be below a hundredth of the nominal value
         counts as that hundredth, so that no draw changes sign.
@@ -85,16 +103,16 @@ class Draws:
         Raises
         ------
         SpreadError
-            Unless `chain` is one open chain.
+                For a grid, or links that act both ways: no device profile has them, so no plan needs their spread.
         """
-        if not chain.feed_forward or chain.rows > 1:
-            raise SpreadError(f"spread: expected an open chain, got {chain.closure} with {chain.rows} rows")
+        if chain.closure is Closure.BIDIRECTIONAL or chain.rows > 1:
+            raise SpreadError(f"spread: expected an open chain or a ring, got {chain.closure} with {chain.rows} rows")
         f0, delta, beta, lam = self.normal
         return Parts(
             stiffness=_column(chain.stiffness) * _positive(1 + spread.f0 * f0) ** 2,
             delta=_column(chain.deltas) * _positive(1 + spread.delta * delta),
             beta=_column(chain.betas) * (1 + spread.beta * beta),
-            lam_gain=_positive(1 + spread.lam * lam),
+            lam_gain=_positive(1 + spread.lam * lam) * _column(np.append(1.0, [] if gain is None else gain)),
         )
 
 
@@ -106,11 +124,17 @@ def _positive(factor: Floats) -> Floats:
     return np.maximum(factor, 0.01)
 
 
-def draw(n: int, *, count: int, seed: int, chains: int = 1) -> Draws:
+def draw(n: int, *, count: int, seed: int | Sequence[int], chains: int = 1) -> Draws:
     """`count` draws of `chains` chains of n actuators; the same for the same seed."""
+    return Draws(_normal(n, count, seed if isinstance(seed, int) else tuple(seed), chains))
+
+
+# A frame's chains in their places, as drawn for every part of the spread that is tried.
+@lru_cache(maxsize=64)
+def _normal(n: int, count: int, seed: int | tuple[int, ...], chains: int) -> Floats:
     normal = np.random.default_rng(seed).standard_normal((4, n, chains, count))
     normal.flags.writeable = False
-    return Draws(normal)
+    return normal
 
 
 @dataclass(frozen=True)
@@ -223,7 +247,9 @@ def judge(wish: Wish, motion: Motion, *, tolerance: float, threshold: float) -> 
     deviation = wish.deviation(motion.phasor)
     wanted = np.abs(wish.amplitude.T[:, :, None]) >= threshold
     present = np.abs(motion.phasor) / wish.full_scale >= threshold
-    right = np.all((wanted == present) | (wish.weights() == 0), axis=(0, 1)) & ~np.any(motion.escaped, axis=0)
+    # A level wanted near the threshold may be felt on either side of it.
+    fine = (wanted == present) | (wish.weights() == 0) | (np.abs(deviation) <= tolerance)
+    right = np.all(fine, axis=(0, 1)) & ~np.any(motion.escaped, axis=0)
     error = np.abs(deviation).max(axis=(0, 1))
     error.flags.writeable = right.flags.writeable = False
     return SpreadReport(error, right, tolerance)
@@ -238,27 +264,55 @@ def wish_of(device: Device, states: Sequence[ChainState]) -> Wish:
     return Wish(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
 
 
-def motion_of(states: Sequence[ChainState], parts: Parts) -> Motion:
+def motion_of(states: Sequence[ChainState], parts: Parts, ring: Parts | None = None) -> Motion:
     """What chains do when each holds its state: `parts` of shape (n, chains, count).
+
+    `ring` : where they are rings, the ones they are drawn around, of shape (n, chains, 1).
 
     Raises
     ------
     SpreadError
         When a state has a drive and a bias at once, or states held by a drive stand beside states held by a bias, or
-        a state has several tones.
+        a state has several tones, or a ring with links is held by a bias.
     """
     if any(state.tones for state in states):
         raise SpreadError("spread: expected states of one tone, got more; judge the tones apart")
     bias = np.array([state.bias for state in states]).T[:, :, None]
     epsilon = np.array([[state.epsilon] for state in states])
-    lam = np.array([np.concatenate([[0.0], state.lam]) for state in states]).T[:, :, None]
+    first = [state.lam[:1] if ring is not None and len(state.lam) else np.zeros(1) for state in states]
+    lam = np.array([np.concatenate([one, state.lam]) for one, state in zip(first, states, strict=True)]).T[:, :, None]
     if np.any(bias) and np.any(epsilon):
         raise SpreadError("spread: expected states held by a drive or by biases, got both in one frame")
     force = bias.astype(np.complex128)
     if not np.any(bias):
         force[0] = epsilon
     omega = np.array([[state.omega] for state in states]) * float(not np.any(bias))
-    return march(parts, force, lam, omega)
+    if ring is None or not np.any(lam):
+        return march(parts, force, lam, omega)
+    if np.any(bias):
+        raise SpreadError("spread: a deflection of coupled rings is not judged; set coupling.lam.min to 0")
+    from .ring_march import march_ring
+
+    near = np.array([state.phasor for state in states]).T[:, :, None]
+    return march_ring(parts, ring, force, lam, omega, near)
+
+
+def centre_of(device: Device, places: Sequence[int]) -> Parts:
+    """Chains as they are known, without what spread makes of them; arrays of shape (n, places, 1)."""
+    return drawn_in(device, Spread(), places, count=1, seed=0)
+
+
+def drawn_in(device: Device, spread: Spread, places: Sequence[int], *, count: int, seed: int) -> Parts:
+    """Chains drawn in their places, row by row, chain by chain; arrays of shape (n, places, count).
+
+    A place has its own stream of the seed, so that its draws do not depend on the other places asked for.
+    """
+    found = []
+    for i in places:
+        place = divmod(i, device.chains_per_row)
+        draws = draw(device.chain_length, count=count, seed=(seed, i))
+        found.append(draws.parts(device.chain_at(*place), spread, device.lam_gain(*place)))
+    return Parts(*(np.concatenate([getattr(one, field.name) for one in found], axis=1) for field in fields(Parts)))
 
 
 def spread_of(
@@ -282,8 +336,11 @@ def spread_of(
     Raises
     ------
     SpreadError
-        When the device's chains are not open, or for states as in `motion_of`.
+        For states as in `motion_of`.
     """
     wish = wish_of(device, states)
     parts = draw(device.chain_length, count=count, seed=seed, chains=len(states)).parts(device.chain, spread)
-    return judge(wish, motion_of(states, parts), tolerance=tolerance, threshold=threshold)
+    ring = (
+        None if device.chain.feed_forward else draw(device.chain_length, count=1, seed=0).parts(device.chain, Spread())
+    )
+    return judge(wish, motion_of(states, parts, ring), tolerance=tolerance, threshold=threshold)

@@ -1,13 +1,14 @@
-"""The task of steering a chain from rest to a standing motion in a given time, on the slow flow.
+"""The task of steering a chain from rest or one motion to another or to rest, in a given time, on the slow flow.
 
-The drive is a smooth step to the steady drive plus quintic B-splines that leave both ends alone; the links follow a
-course chosen beforehand. The splines' coefficients are the unknowns.
+The drive is a smooth step from the one steady drive to the other plus quintic B-splines that leave both ends alone; the
+links follow a course chosen beforehand. The splines' coefficients are the unknowns.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from chainsim import Chain
 
 from .slow_flow import Course, follow_course
 
-__all__ = ["LinkCourse", "Standing", "Steering"]
+__all__ = ["LinkCourse", "Standing", "Steering", "rest", "smooth_step"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -34,35 +35,53 @@ MOVEMENT, LOOKS, EFFORT = 0.02, 40, 1e-4
 
 @dataclass(frozen=True)
 class Standing:
-    """A steady motion of a chain of n.
+    """A steady motion of a chain of n, or rest.
 
     Attributes
     ----------
     epsilon : complex drive phasor. lam : float64, shape (n-1,), links. phasor : complex128, shape (n,), dimensionless.
+    turning : radians per tau by which drive and motion turn in the frame of the way.
     """
 
     epsilon: complex
     lam: Floats
     phasor: Complexes
+    turning: float = 0.0
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing moves: links are then free."""
+        return not self.phasor.any()
+
+
+def rest(lam: Floats) -> Standing:
+    """Rest, with links of which only the number matters where they may move."""
+    return Standing(0j, lam, np.zeros(len(lam) + 1, dtype=np.complex128))
 
 
 @dataclass(frozen=True)
 class LinkCourse:
-    """Links that stay at `top` and come to their steady values in the last `share` of the way.
+    """Links that go to `top` in the first `share` of the way and leave it in the last; at rest they are there at once.
 
-    `top` is None where they may not move: they are the steady ones throughout.
+    `top` is None where they may not move: they are those of the motions throughout.
     """
 
     top: float | None
     share: float
 
-    def at(self, x: Floats, steady: Floats) -> tuple[Floats, Floats]:
+    def at(self, x: Floats, start: Standing, held: Standing) -> tuple[Floats, Floats]:
         """Links and their derivatives in x at x in [0, 1]; each float64, shape (len(x), n-1)."""
         if self.top is None:
-            still = np.repeat(steady[None, :], len(x), axis=0)
+            still = np.repeat((start if held.resting else held).lam[None, :], len(x), axis=0)
             return still, np.zeros_like(still)
-        step, slope = smooth_step((x - 1) / self.share + 1)
-        return self.top + (steady - self.top) * step[:, None], (steady - self.top) * slope[:, None] / self.share
+        value, slope = np.full((len(x), len(held.lam)), self.top), np.zeros((len(x), len(held.lam)))
+        for end, place, way in ((start, x / self.share, -1.0), (held, (x - 1) / self.share + 1, 1.0)):
+            if not end.resting:
+                step, rise = smooth_step(place)
+                share = step if way > 0 else 1 - step
+                value += (end.lam - self.top) * share[:, None]
+                slope += (end.lam - self.top) * way * rise[:, None] / self.share
+        return value, slope
 
 
 def smooth_step(x: Floats) -> tuple[Floats, Floats]:
@@ -90,10 +109,11 @@ def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Steering:
-    """The task: `chain` at `omega` from rest to `held` in `duration` (tau) with the links on `links`."""
+    """The task: `chain` at `omega` from `start` to `held` in `duration` (tau) with the links on `links`."""
 
     chain: Chain
     omega: float
+    start: Standing
     held: Standing
     links: LinkCourse
     duration: float
@@ -108,15 +128,22 @@ class Steering:
         """Unknowns: real and imaginary part of every coefficient."""
         return 2 * (self.intervals - SUPPORT + 1)
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
-        """What motions are measured in: the largest steady amplitude."""
-        return float(np.abs(self.held.phasor).max())
+        """What motions are measured in: the largest amplitude at the ends."""
+        return float(np.abs([self.start.phasor, self.held.phasor]).max())
+
+    @cached_property
+    def unit(self) -> float:
+        """What drives are measured in: the larger steady one, or what would hold one actuator at resonance."""
+        steady = max(abs(self.start.epsilon), abs(self.held.epsilon))
+        return steady or self.chain.delta * self.omega * self.amplitude
 
     @property
     def steps(self) -> int:
         """Integration steps."""
-        top = max(float(self.held.lam.max(initial=0.0)), self.links.top or 0.0)
+        strongest = max(float(end.lam.max(initial=0.0)) for end in (self.start, self.held))
+        top = max(strongest, self.links.top or 0.0)
         bend = 0.75 * abs(self.chain.beta) * (2 * self.amplitude) ** 2
         rate = (abs(1 - self.omega**2) + self.chain.delta + top + bend) / (2 * self.omega)
         return max(4 * self.intervals, math.ceil(self.duration * rate / STEP))
@@ -124,22 +151,28 @@ class Steering:
     def drive(self, x: Floats, unknowns: Floats) -> tuple[Complexes, Complexes]:
         """Drive envelopes of unknowns of shape (P, size) and their derivatives in x; complex128, (len(x), P) each."""
         half = self.size // 2
-        factors = abs(self.held.epsilon) * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
+        factors = self.unit * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
         value, slope = splines(x, self.intervals)
         step, step_slope = smooth_step(x)
-        last = self.held.epsilon
-        return np.asarray(last * step[:, None] + value @ factors), np.asarray(
-            last * step_slope[:, None] + slope @ factors
-        )
+        last, angle = self.held.epsilon, 1j * self.start.turning * self.duration
+        first = self.start.epsilon * np.exp(angle * x)
+        steady, steady_slope = first + (last - first) * step, (last - first) * step_slope + angle * first * (1 - step)
+        return np.asarray(steady[:, None] + value @ factors), np.asarray(steady_slope[:, None] + slope @ factors)
 
     def follow(self, unknowns: Floats, softness: float) -> Complexes:
         """Amplitudes on the way for unknowns of shape (P, size); complex128, shape (steps + 1, n, P)."""
         x = np.linspace(0.0, 1.0, 2 * self.steps + 1)
         epsilon, epsilon_slope = self.drive(x, unknowns)
-        lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.held.lam))
-        course = Course(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration)
+        lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.start, self.held))
+        course = Course(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
         with np.errstate(all="ignore"):
-            return follow_course(self.chain, self.omega, self.duration, course, self.held.phasor, softness)
+            return follow_course(self.chain, self.omega, self.duration, course, self.start.phasor, softness)
+
+    def _lent(self, x: Floats) -> Floats:
+        """Squares of amplitudes between those of the ends; rest has none to lend."""
+        ends = [self.held if one.resting else one for one in (self.start, self.held)]
+        first, last = (np.abs((self.start if one.resting else one).phasor) ** 2 for one in ends)
+        return np.asarray(first + (last - first) * smooth_step(x)[0][:, None])
 
     def misses(self, unknowns: Floats, softness: float) -> tuple[Floats, Floats]:
         """By how much the end is missed, shape (P, 2 n), and movement and effort, shape (P, S)."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Closure
 
-__all__ = ["MAIN", "ORDERS", "TwoTones", "two_tones"]
+__all__ = ["MAIN", "ORDERS", "TwoTones", "apart", "two_tones"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -54,6 +54,25 @@ class TwoTones:
     def width(self) -> float:
         """Width of a bar in actuators."""
         return math.pi / float(self.lag[MAIN + 1] - self.lag[MAIN])
+
+    @property
+    def spacing(self) -> float:
+        """How far apart the two tones are, over f0: the beat rate."""
+        return float(self.omega[MAIN + 1] - self.omega[MAIN])
+
+
+def apart(chain: Chain, *, amplitude: float, width: float, spacing: float) -> TwoTones:
+    """Two tones of this amplitude each on single actuators, which take any spacing: no combination of them moves.
+
+    Parameters
+    ----------
+    width : of a bar in actuators. spacing : of the tones, over f0; they lie on both sides of resonance.
+    """
+    step = math.pi / width
+    middle = math.sqrt(max(1 + 2.25 * chain.beta * amplitude**2, 0.1)) - spacing / 2
+    phasor = np.where((ORDERS == 0) | (ORDERS == 1), amplitude, 0.0).astype(np.complex128)
+    parts = _Parts(0.0, np.asarray(middle + spacing * ORDERS), np.asarray((math.pi - step) / 2 + step * ORDERS), phasor)
+    return TwoTones(parts.lam, parts.omega, parts.lag, _drive(chain, parts), phasor)
 
 
 def two_tones(chain: Chain, *, amplitude: float, width: float, lam: float | None = None) -> TwoTones | None:

@@ -13,18 +13,21 @@ from chainsim import Device, Outcome
 from .links import detuning_gain
 from .margins import lacking_of, slew_of
 from .plan import ChainState, Margins, Tone
-from .two_tones import MAIN, ORDERS, TwoTones, two_tones
+from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
 from .wish import ChainWish
 
-__all__ = ["TONES_GOOD", "walking_state"]
+__all__ = ["TONES_GOOD", "walking_rate_hz", "walking_state"]
 
 Floats = NDArray[np.float64]
 
 # What is asked of tones, relative to each: their combinations are only modelled in the slow flow.
 TONES_GOOD = 5e-3
 SIDE = [k not in (MAIN, MAIN + 1) for k in range(len(ORDERS))]
-# Halvings in the search for the largest amplitude that has an answer; relative deviation of a width that is the same.
-HALVINGS, SAME_WIDTH = 5, 0.02
+# Halvings in the search for the largest amplitude that has an answer; relative deviation of a width or rate that is the
+# same, and how often and how well the width is fitted to a rate.
+HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
+# Bars narrower than this have tones at lags of nearly 0 and 180 degrees, beyond any lam.
+NARROWEST = 1.01
 
 
 def walking_state(device: Device, wish: ChainWish) -> ChainState:
@@ -32,9 +35,9 @@ def walking_state(device: Device, wish: ChainWish) -> ChainState:
     level, lam = float(wish.amplitude.max()), None if math.isnan(wish.lam) else wish.lam
     if np.ptp(wish.amplitude[wish.weight > 0]) > 0:
         return _nothing(device, wish, "bars walk with one amplitude along a chain; it lacks a drive for every actuator")
-    found, share = _found(device, level, wish.width, lam), 1.0
+    found, share = _found(device, level, wish, lam), 1.0
     if found is None:
-        share, found = _lower(device, level, wish.width, lam)
+        share, found = _lower(device, level, wish, lam)
     if found is None:
         return _nothing(device, wish, "no two tones stand under one lam; it lacks range of lam")
     state = _state(device, wish, found)
@@ -42,12 +45,26 @@ def walking_state(device: Device, wish: ChainWish) -> ChainState:
     return replace(state, outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking)
 
 
-def _found(device: Device, level: float, width: float, lam: float | None) -> TwoTones | None:
+def walking_rate_hz(device: Device, state: ChainState) -> float:
+    """Bars that pass an actuator in a second in the state of a walk."""
+    other = next(tone for tone in state.tones if not tone.side)
+    return (other.omega - state.omega) * device.f0_hz
+
+
+def _found(device: Device, level: float, wish: ChainWish, lam: float | None) -> TwoTones | None:
     """Two tones under a lam that can be set."""
     chain, coupling = device.chain, device.coupling
     amplitude = level * device.full_scale / 2
+    spacing = wish.rate_hz / device.f0_hz
+    width = wish.width
+    if math.isnan(width):
+        width = max(NARROWEST, math.pi / 2 / math.atan(spacing / device.delta))
     if device.chain_length == 1:
-        return two_tones(chain, amplitude=amplitude, width=width)
+        if math.isnan(spacing):
+            return two_tones(chain, amplitude=amplitude, width=width)
+        return apart(chain, amplitude=amplitude, width=width, spacing=spacing)
+    if math.isnan(wish.width):
+        width = _fitted(device, amplitude, width, spacing)
     if lam is None and coupling.lam.min < coupling.lam.max:
         free = two_tones(chain, amplitude=amplitude, width=width)
         if free is None:
@@ -60,11 +77,25 @@ def _found(device: Device, level: float, width: float, lam: float | None) -> Two
     return two_tones(chain, amplitude=amplitude, width=width, lam=coupling.lam.min if lam is None else lam)
 
 
-def _lower(device: Device, level: float, width: float, lam: float | None) -> tuple[float, TwoTones | None]:
+def _fitted(device: Device, amplitude: float, width: float, spacing: float) -> float:
+    """The width at which two tones are so far apart, over f0; a linear chain's where none is found."""
+    first, asked = width, spacing
+    for _ in range(FITS):
+        found = two_tones(device.chain, amplitude=amplitude, width=width)
+        if found is None:
+            return first
+        if abs(found.spacing / spacing - 1) < FITTED:
+            break
+        asked *= spacing / found.spacing
+        width = max(NARROWEST, math.pi / 2 / math.atan(asked / device.delta))
+    return width
+
+
+def _lower(device: Device, level: float, wish: ChainWish, lam: float | None) -> tuple[float, TwoTones | None]:
     good, bad, kept = 0.0, 1.0, None
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
-        found = _found(device, level * middle, width, lam)
+        found = _found(device, level * middle, wish, lam)
         if found is None:
             bad = middle
         else:
@@ -76,8 +107,13 @@ def _lacking(device: Device, wish: ChainWish, found: TwoTones, share: float) -> 
     if share < 1.0:
         part = f"{100 * share:.0f} % of this amplitude"
         return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta)"
-    if abs(found.width / wish.width - 1) > SAME_WIDTH:
+    if abs(found.width / wish.width - 1) > SAME:
         return f"its lam makes bars {found.width:.3g} actuators wide; it lacks range of lam"
+    rate_hz = found.spacing * device.f0_hz
+    if abs(rate_hz / wish.rate_hz - 1) > SAME:
+        if math.isnan(wish.width):
+            return f"its lam makes bars walk at {rate_hz:.3g} Hz; it lacks range of lam"
+        return f"bars of this width walk at {rate_hz:.3g} Hz; it lacks a drive for every actuator"
     if found.omega[MAIN] < device.omega.min or found.omega[MAIN + 1] > device.omega.max:
         return f"it takes frequencies outside {device.omega.min:g}..{device.omega.max:g}; it lacks range of omega"
     return ""

@@ -15,17 +15,19 @@ from .joining import as_tone
 from .margins import WELL_SHARE
 from .plan import ChainState, Ramp, Tone, ToneRamp
 from .slow_way import Sounding, slow_fall, slow_rise
+from .tone_way import quick_rise
 from .walking import TONES_GOOD
 from .wave_fit import GOOD
-from .way_in import find_fall, find_way
+from .way_in import find_way
 from .way_limits import WayLimits
+from .way_out import find_fall
 
-__all__ = ["enter_wave", "leave_wave"]
+__all__ = ["BUDGET", "enter_wave", "leave_wave", "limits_of"]
 
 Floats = NDArray[np.float64]
 
 # Slopes a search for a way may take, about 10 ms each.
-BUDGET = 300
+BUDGET = 150
 # Single actuators go any way that is smooth: its length in periods, its smoothness, and its nodes.
 PERIODS, SMOOTHNESS, NODES = 40, 5, 161
 
@@ -38,12 +40,16 @@ def enter_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
     if not state.tones and device.coupling.closure is Closure.OPEN:
         ramp = find_way(
             device.chain, epsilon=state.epsilon, lam=state.lam, omega=state.omega, phasor=state.phasor,
-            limits=_limits(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
+            limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
         )  # fmt: skip
         if not ramp.lacking:
             return ramp
         lacking = ramp.lacking
     ramp = slow_rise(device, _sounding(state), TONES_GOOD if state.tones else GOOD)
+    if state.tones and moves and device.coupling.closure is Closure.OPEN:
+        quick = quick_rise(device, _sounding(state), limits_of(device, moves), TONES_GOOD)
+        if quick is not None and (ramp.lacking or quick.duration_s < ramp.duration_s):
+            return quick
     return ramp if not (ramp.lacking and lacking) else _lacking(ramp, lacking)
 
 
@@ -55,7 +61,7 @@ def leave_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
         return slow_fall(device, _sounding(state), moves)
     ramp = find_fall(
         device.chain, epsilon=state.epsilon, lam=state.lam, omega=state.omega, phasor=state.phasor,
-        limits=_limits(device, moves), tau_per_s=device.tau_per_s,
+        limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
     )  # fmt: skip
     return as_tone(ramp, state.omega)
 
@@ -64,7 +70,8 @@ def _lacking(ramp: Ramp, lacking: str) -> Ramp:
     return Ramp(ramp.t_s, ramp.epsilon, ramp.epsilon_slope, lacking=lacking, tones=ramp.tones)
 
 
-def _limits(device: Device, moves: bool) -> WayLimits:
+def limits_of(device: Device, moves: bool) -> WayLimits:
+    """What a way may use of a device; `moves` where lam may differ on it from what it is at the ends."""
     scope: Literal["fixed", "chain", "link"] = "fixed"
     if moves:
         scope = "link" if device.coupling.scope == "link" else "chain"

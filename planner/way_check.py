@@ -49,6 +49,17 @@ class Way:
         slope = (begin + s * (2 * square + 3 * s * cube)) / width
         return value, np.where(tau < self.tau[-1], slope, 0.0)
 
+    def then(self, other: Way) -> Way:
+        """This way and another behind it, which begins where this one ends."""
+        end = float(self.tau[-1])
+        return Way(
+            np.concatenate([self.tau, end + other.tau[1:]]),
+            np.concatenate([self.epsilon, other.epsilon[1:]]),
+            np.concatenate([self.epsilon_slope, other.epsilon_slope[1:]]),
+            np.concatenate([self.lam_tau, end + other.lam_tau[1:]]),
+            np.concatenate([self.lam, other.lam[1:]]),
+        )
+
     def links(self, tau: Floats) -> Floats:
         """Links at instants `tau`: float64, shape (len(tau), n-1)."""
         out = np.empty((len(tau), self.lam.shape[1]))
@@ -63,27 +74,33 @@ class Orbit:
 
     Attributes
     ----------
-    harmonics : complex128, shape (H, n). lam : float64, shape (n-1,), the links it stands under.
+    harmonics : complex128, shape (H, n). lam : float64, shape (n-1,), the links it stands under. omega : over f0.
     """
 
     harmonics: Complexes
     lam: Floats
+    omega: float
 
-    def prelude(self, chain: Chain, omega: float, phase: float) -> Floats:
-        """Forces on every actuator that lead from rest onto the orbit, up to one sample before the carrier's `phase`.
+    def turned(self, angle: float) -> Orbit:
+        """The orbit with its phase advanced by an angle in radians."""
+        factor = np.exp(1j * angle * np.arange(1, len(self.harmonics) + 1))
+        return Orbit(np.asarray(self.harmonics * factor[:, None]), self.lam, self.omega)
+
+    def prelude(self, chain: Chain, dtau: float, phase: float) -> Floats:
+        """Forces on every actuator that lead from rest onto the orbit, up to one sample before its `phase`.
 
         The motion is chosen, the orbit times a smooth step, and the equations say which forces that takes.
 
         Returns
         -------
-        float64, shape (samples, n), at `SAMPLES_PER_PERIOD`.
+        float64, shape (samples, n), every `dtau`.
         """
         count = PRELUDE * SAMPLES_PER_PERIOD
-        length = 2 * math.pi / omega * PRELUDE
+        length = count * dtau
         x = np.arange(count) / count
         step, slope, bend = x**3 * (10 - 15 * x + 6 * x**2), 30 * (x * (1 - x)) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
-        rate = 1j * omega * np.arange(1, len(self.harmonics) + 1)
-        turning = np.exp(rate * (x[:, None] - 1) * length + rate / omega * phase)
+        rate = 1j * self.omega * np.arange(1, len(self.harmonics) + 1)
+        turning = np.exp(rate * (x[:, None] - 1) * length + rate / self.omega * phase)
         z, v, a = ((turning * rate**k @ self.harmonics).real for k in range(3))
         moved = step[:, None] * z
         force = (
@@ -113,7 +130,7 @@ def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: i
 
     Parameters
     ----------
-    phase : of the carrier when the way begins, radians.
+    phase : of the carrier when the way begins, and of the orbit, radians.
     """
     from chainsim import GridIntegrator
 
@@ -131,7 +148,7 @@ def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: i
         shape=(1, chain.n), chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
     )
     if start is not None:
-        before = start.prelude(chain, omega, phase) / pass_by
+        before = start.prelude(chain, dtau, phase) / _hold(start.omega, dtau)[0]
         grid.advance(before[:, None, :], np.concatenate([[0.0], start.lam])[None, :])
     z = grid.advance(force, lam)[:, 0]
     after = (z[steps:] * carrier[steps:, None].conj()).reshape(periods, SAMPLES_PER_PERIOD, chain.n)

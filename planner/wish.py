@@ -31,8 +31,9 @@ class ChainWish:
     amplitude : float64, shape (n,), in units of full scale.
     phase : float64, shape (n,), radians, NaN where any will do; the first is 0.
     weight : float64, shape (n,), 0 = don't care.
-    width : of bars that walk, in actuators; 0 where nothing walks. place : the column of the chain's first actuator
-        where they do, else 0. lam : of every link, given by other chains; NaN where it is free.
+    width : of bars that walk, in actuators; 0 where nothing walks, NaN where it follows from the rate. place : the
+        column of the chain's first actuator where they do, else 0. lam : of every link, given by other chains; NaN
+        where it is free. rate_hz : bars that pass in a second; NaN where that follows from the width.
     """
 
     amplitude: Floats
@@ -41,11 +42,12 @@ class ChainWish:
     width: float = 0.0
     place: float = 0.0
     lam: float = math.nan
+    rate_hz: float = math.nan
 
     @property
     def key(self) -> bytes:
         """The wish as bytes, other than those of any amplitudes alone."""
-        rest = [self.width, self.place, self.lam]
+        rest = [self.width, self.place, self.lam, self.rate_hz]
         return MARK + np.concatenate([self.amplitude, self.phase, self.weight, rest]).tobytes()
 
     @classmethod
@@ -54,8 +56,8 @@ class ChainWish:
         if len(key) % 8 != 1:
             return None
         numbers = np.frombuffer(key[1:])
-        amplitude, phase, weight = numbers[:-3].reshape(3, -1)
-        return cls(amplitude, phase, weight, *numbers[-3:].tolist())
+        amplitude, phase, weight = numbers[:-4].reshape(3, -1)
+        return cls(amplitude, phase, weight, *numbers[-4:].tolist())
 
 
 class Turned(NamedTuple):
@@ -77,7 +79,8 @@ def wishes_of(pattern: TargetPattern, device: Device) -> Iterator[Turned]:
     for number, (amplitude, phase, heed) in enumerate(zip(*chains, strict=True)):
         if pattern.walking is not None and np.any(amplitude):
             place = float(number % device.chains_per_row * n)
-            yield Turned(ChainWish(amplitude, np.full(n, np.nan), heed, pattern.walking.width, place))
+            walking, phases = pattern.walking, np.full(n, np.nan)
+            yield Turned(ChainWish(amplitude, phases, heed, walking.width, place, rate_hz=walking.rate_hz))
         else:
             yield _turned(amplitude, phase, heed)
 

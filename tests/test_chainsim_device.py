@@ -1,11 +1,15 @@
 """Device profiles: what is built in, and what is said about a profile that cannot be used."""
 
 import math
+from typing import Any
 
+import numpy as np
 import pytest
 import yaml
+from pydantic import ValidationError
 
 from chainsim import Closure, Device, ProfileError, device_names, load_device
+from chainsim.calibrated import Actuator
 
 
 def profile(**changes):
@@ -111,3 +115,72 @@ def test_names_that_lead_nowhere(tmp_path):
     (tmp_path / "latin.yaml").write_bytes("name: Gerät".encode("latin-1"))
     with pytest.raises(ProfileError, match="not UTF-8 at byte 9"):
         load_device(str(tmp_path / "latin.yaml"))
+
+
+def measured(**others: Any) -> Device:
+    """Row 1 of `linked-6x6`, or of a device with one lam per chain, measured in part."""
+    device = load_device(others.pop("base", "linked-6x6"))
+    actuators = (
+        Actuator(row=1, col=0, f0_hz=device.f0_hz * 1.01, epsilon_per_volt=2.2e-3),
+        Actuator(row=1, col=2, delta=6e-3, lam=0.0063, lam_set=0.006),
+        Actuator(row=1, col=3, beta=-1.5, lam=0.0054, lam_set=0.006),
+    )
+    return device.model_copy(update={"actuators": actuators} | others)
+
+
+def test_a_chain_alone_is_a_device_of_its_own() -> None:
+    device = measured()
+    alone = device.alone(1)
+    assert (alone.rows, alone.cols, alone.chains_per_row) == (1, 6, 1)
+    assert alone.chain == device.chain_at(1)
+    assert alone.chain.stiffness[0] == pytest.approx(1.01**2)
+    assert (alone.chain.deltas[2], alone.chain.betas[3]) == (6e-3, -1.5)
+    np.testing.assert_allclose(alone.lam_gain(0), device.lam_gain(1))
+    np.testing.assert_allclose(alone.lam_gain(0), [1, 1.05, 0.9, 1, 1])
+    assert alone.epsilon_per_volt == 2.2e-3
+    assert alone.escape_amplitude == pytest.approx(1.5**-0.5)
+    assert alone.coupling == device.coupling
+    # The device as a whole has chains of several kinds: what they have in common is the profile.
+    assert device.chain == load_device("linked-6x6").chain
+
+
+def test_chains_without_measurements_are_alike() -> None:
+    device = measured()
+    assert device.alone(0) == device.alone(5)
+    assert device.alone(0).actuators == ()
+    assert device.alone(0).chain == device.chain
+    assert device.alone(0) != device.alone(1)
+
+
+def test_one_lam_for_a_chain_is_counted_in_what_links_make_of_it() -> None:
+    device = measured(base="paper-6x6")
+    alone, mean = device.alone(1), np.mean([1, 1.05, 0.9, 1, 1])
+    assert device.lam_unit(1) == pytest.approx(mean)
+    assert device.lam_unit(0) == 1.0
+    assert alone.coupling.lam.max == pytest.approx(device.coupling.lam.max * mean)
+    np.testing.assert_allclose(alone.lam_gain(0), np.array([1, 1.05, 0.9, 1, 1]) / mean)
+
+
+def test_spread_is_read_strictly_and_written_only_where_it_is() -> None:
+    plain = load_device("linked-6x6")
+    assert plain.spread is None
+    assert "spread" not in plain.as_dict()
+    told = Device.model_validate(plain.as_dict() | {"spread": {"frequency": 0.01}})
+    assert told.spread is not None
+    assert (told.spread.frequency, told.spread.damping, told.spread.beta, told.spread.lam) == (0.01, 0, 0, 0)
+    assert Device.model_validate(told.as_dict()) == told
+    for wrong in ({"f0": 0.01}, {"frequency": -0.01}, {"lam": 1.5}, {"beta": float("nan")}):
+        with pytest.raises(ValidationError, match="spread"):
+            Device.model_validate(plain.as_dict() | {"spread": wrong})
+
+
+def test_a_copy_with_other_actuators_forgets_those_before() -> None:
+    device = measured()
+    assert device.drive_per_volt(1) == 2.2e-3
+    other = device.model_copy(update={"actuators": (Actuator(row=1, col=0, epsilon_per_volt=2.5e-3),)})
+    assert other.drive_per_volt(1) == 2.5e-3
+    assert device.drive_per_volt(1) == 2.2e-3
+    fresh = measured()
+    assert fresh == device
+    assert fresh.as_dict() == device.as_dict()
+    assert fresh.model_dump_json() == device.model_dump_json()

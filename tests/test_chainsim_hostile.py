@@ -7,36 +7,69 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chainsim import Chain, Outcome, RungError, Setting, solve, steady_from_rest
+from chainsim import (
+    Chain,
+    GridIntegrator,
+    Outcome,
+    RungError,
+    Setting,
+    Start,
+    Terms,
+    balance_near,
+    integrate_terms,
+    load_rung,
+    solve,
+    steady_from_rest,
+)  # fmt: skip
 
 ESCAPE = 2 / (3 * np.sqrt(3))
 BASE = {"n": 6, "delta": 0.02, "beta": -1.0, "epsilon": 1e-3, "lam": 0.01, "omega": 1.05, "preload": 0.0}
+
+
+def fold(delta, omega):
+    """The drive at which the lower branch of the first oscillator ends, by the cubic of one harmonic."""
+    kappa, g = 1 - omega**2, delta * omega
+    v = kappa / 3 * (2 - np.sqrt(1 - 3 * (g / kappa) ** 2))
+    return np.sqrt(v * ((kappa - v) ** 2 + g * g) / 0.75)
+
+
 HOSTILE = [
     *({"lam": value} for value in (0.0, 1e-12, 1.0, 1e6, -2.0)),
     *({"omega": value} for value in (1e-6, 1e-3, 1.0, np.nextafter(1.0, 0), np.nextafter(1.0, 2), 1e3, 1e6)),
     *({"delta": value} for value in (0.0, 1e-12, 1.0, 1e6)),
     *({"beta": value} for value in (0.0, 1e-12, -1e-12, 1e12, -1e12, 1e300, -1e300, 1e-300, -5e-324)),
     *({"epsilon": value} for value in (0.0, 5e-324, 1e-200, 1.0, 1e12, 1e300)),
+    *({"epsilon": fold(0.02, 0.95) * (1 + by), "omega": 0.95} for by in (-1e-12, 1e-12)),
     *({"preload": ESCAPE * (1 + by), "epsilon": 0.0} for by in (-1e-9, 1e-9)),
+    *({"epsilon": ESCAPE * (1 + by), "omega": 1e-3} for by in (-1e-9, 1e-9)),
+    *({"n": value} for value in (1, 2, 1000)),
     {"preload": 1e12},
+    {"preload": 0.1, "epsilon": 0.0},
     {"beta": -1e12, "epsilon": 1e-9},
+    {"beta": 1.0, "epsilon": 30.0, "delta": 0.2},
     {"delta": 0.0, "omega": 1.0, "beta": 0.0},
     {"delta": 1e6, "omega": 1e-6},
     {"lam": 1e6, "omega": 1e3},
 ]
-SYSTEMS = {
-    "open": {}, "ring": {"closure": "ring"}, "bidirectional": {"closure": "bidirectional"}, "grid": {"rows": 2},
-    "amplifier": {"kind": "amplifier"}, "unequal": {"delta": [0.02, 0.03] * 3, "stiffness": [1.0, 1.01] * 3},
-}  # fmt: skip
+CLOSURES = {"open": {}, "ring": {"closure": "ring"}, "bidirectional": {"closure": "bidirectional"}, "grid": {}}
+SYSTEMS = CLOSURES | {"amplifier": {"kind": "amplifier"}, "unequal": {}}
+ROWS = {1: 1, 2: 2, 6: 2, 1000: 20, 1_000_000: 1000}
 STEADY = ["static", "linear", "one_harmonic", "harmonic_balance"]
+# The four closures every day, the kinds with the long runs.
+each_system = pytest.mark.parametrize(
+    "system", [pytest.param(name, marks=() if name in CLOSURES else pytest.mark.slow) for name in SYSTEMS]
+)
 
 
 def built(system, extreme):
     values = BASE | extreme
-    given = {"delta": values["delta"], "beta": values["beta"]} | SYSTEMS[system]
-    if "delta" in extreme:
-        given["delta"] = extreme["delta"]
-    chain = Chain.of(values["n"], **given)
+    n, given = values["n"], {"delta": values["delta"], "beta": values["beta"]} | SYSTEMS[system]
+    if system == "grid":
+        given["rows"] = ROWS.get(n, 1)
+    if system == "unequal":
+        given["stiffness"] = np.resize([1.0, 1.01], n)
+        given["delta"] = values["delta"] * np.resize([1.0, 1.5], n)
+    chain = Chain.of(n, **given)
     down = {"lam_y": values["lam"]} if chain.rows > 1 else {}
     names = ("epsilon", "lam", "omega", "preload")
     return chain, Setting.of(chain, **{name: values[name] for name in names}, **down)
@@ -53,26 +86,37 @@ def sane(response):
             assert response.stable[index]
 
 
-@pytest.mark.parametrize("system", list(SYSTEMS))
-@pytest.mark.parametrize("rung", STEADY)
+@each_system
+@pytest.mark.parametrize("rung", [*STEADY, pytest.param("envelope", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("extreme", HOSTILE, ids=str)
 def test_steady_rungs(system, rung, extreme):
-    response = solve(*built(system, extreme), tol=1e-6, rung=rung)
+    chain, setting = built(system, extreme)
+    refusal = load_rung(rung).refusal(chain, setting, Start.REST)
+    if refusal:
+        # The envelope says what it is not true of; the others answer everything.
+        assert rung == "envelope"
+        with pytest.raises(RungError, match="use rung"):
+            solve(chain, setting, tol=1e-6, rung=rung)
+        return
+    response = solve(chain, setting, tol=1e-6, rung=rung)
     sane(response)
-    assert response.stats.newton_steps <= 20_000
+    assert response.stats.newton_steps <= 20_000 * max(1, chain.n // 100)
+    assert response.stats.rhs_evals <= 5e8
 
 
-@pytest.mark.parametrize("system", list(SYSTEMS))
+@each_system
 @pytest.mark.parametrize("extreme", HOSTILE, ids=str)
 def test_integration(system, extreme):
+    if extreme == {"n": 1000} and system in {"ring", "bidirectional"}:
+        pytest.skip("its joint map is a matrix of 2000 x 2000")
     response = steady_from_rest(*built(system, extreme), tol=1e-6, max_periods=300)
     sane(response)
     assert response.stats.rhs_evals <= 5e8
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("system", list(SYSTEMS))
-@pytest.mark.parametrize("extreme", HOSTILE, ids=str)
+@each_system
+@pytest.mark.parametrize("extreme", [each for each in HOSTILE if each != {"n": 1000}], ids=str)
 def test_auto(system, extreme):
     response = solve(*built(system, extreme), tol=1e-6)
     sane(response)
@@ -84,17 +128,36 @@ def test_auto(system, extreme):
 @pytest.mark.parametrize("rung", STEADY)
 def test_lengths(n, system, rung):
     response = solve(*built(system, {"n": n}), tol=1e-6, rung=rung)
-    sane(response)
     assert response.outcome[0] in (Outcome.OK, Outcome.OUT_OF_BUDGET)
     # The multipliers of a joint chain of more than 200 are not formed, and without them nothing is called stable.
     assert (response.outcome[0] is Outcome.OK) == (n < 1000 or system in {"open", "amplifier"})
 
 
 @pytest.mark.slow
-def test_a_chain_of_a_hundred_thousand():
-    chain = Chain(100_000, 0.02, -1.0)
-    response = solve(chain, Setting.of(chain, epsilon=1e-3, lam=0.01, omega=1.05), tol=1e-6, rung="harmonic_balance")
-    assert response.outcome[0] is Outcome.OK
+@pytest.mark.parametrize("system", ["open", "grid", "amplifier"])
+@pytest.mark.parametrize("rung", [*STEADY, "auto"])
+def test_a_million_oscillators(system, rung):
+    response = solve(*built(system, {"n": 1_000_000}), tol=1e-6, rung=rung)
+    sane(response)
+    # Whether a sudden drive of so long a chain reaches the lower answer is not integrated.
+    assert response.outcome[0] is Outcome.OK or (rung, response.outcome[0]) == ("auto", Outcome.OUT_OF_BUDGET)
+
+
+@pytest.mark.parametrize("basis_and_rung", ["static", "one_harmonic", "harmonic_balance", "linear"])
+def test_long_chains_are_answered_as_short_ones(basis_and_rung, monkeypatch):
+    from chainsim import long
+
+    chain = Chain(40, 0.02, -1.0)
+    forces = {"epsilon": 0.0, "preload": 0.1} if basis_and_rung == "static" else {"epsilon": 1e-3}
+    setting = Setting.of(chain, lam=0.2, omega=1.05, **forces)
+    short = solve(chain, setting, tol=1e-9, rung=basis_and_rung)
+    monkeypatch.setattr(long, "LONG", 10)
+    monkeypatch.setattr(long, "BLOCK", 7)
+    alone = solve(chain, setting, tol=1e-9, rung=basis_and_rung)
+    assert alone.outcome[0] is short.outcome[0] is Outcome.OK
+    assert alone.harmonics == pytest.approx(short.harmonics, rel=1e-12)
+    assert alone.mean == pytest.approx(short.mean, rel=1e-12)
+    assert alone.error_estimate == pytest.approx(short.error_estimate, rel=1e-6, abs=1e-13)
 
 
 def exact_chain(setting, delta):
@@ -114,7 +177,7 @@ def exact_chain(setting, delta):
 LINEAR = [{key: value for key, value in each.items() if key != "beta"} for each in HOSTILE]
 
 
-@pytest.mark.parametrize("extreme", [each for each in LINEAR if not {"preload"} & set(each)], ids=str)
+@pytest.mark.parametrize("extreme", [each for each in LINEAR if not {"preload", "n"} & set(each)], ids=str)
 def test_linear_answers_against_exact_fractions(extreme):
     values = BASE | extreme | {"beta": 0.0}
     if values["delta"] == 0.0 and abs(values["omega"] - 1) < 1e-15:
@@ -202,7 +265,7 @@ def test_energy_stays_bounded_over_a_million_periods():
     assert np.abs(errors[50:]).max() <= 2 * np.abs(errors[:50]).max() + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     system=st.sampled_from(list(SYSTEMS)), rung=st.sampled_from(STEADY), lam=st.floats(-1e6, 1e6),
     omega=st.floats(1e-6, 1e6), delta=st.floats(0, 1e6), beta=st.floats(-1e12, 1e12), epsilon=st.floats(0, 1e12),
@@ -213,7 +276,26 @@ def test_around_the_list(system, rung, lam, omega, delta, beta, epsilon, preload
     sane(solve(*built(system, extreme), tol=1e-6, rung=rung))
 
 
-@pytest.mark.parametrize("system", list(SYSTEMS))
+@each_system
+@pytest.mark.parametrize("size", [1.5, 50.0, 1e200])
+def test_guides_beyond_the_hilltop(system, size):
+    chain, setting = built(system, {})
+    for rate in (1, 3):
+        guide = np.full((1, rate, chain.n), size, dtype=np.complex128)
+        sane(balance_near(chain, setting, guide, tol=1e-6, mean=np.full((1, chain.n), size)))
+    sane(balance_near(chain, setting, guide[:, 0], tol=1e-6))
+
+
+def test_steps_too_large_are_cut_or_refused():
+    grid = GridIntegrator(shape=(1, 1), chain_length=1, delta=0.1, beta=0.0, ring=False, dtau=200.0)
+    force = np.ones((3, 1, 1))
+    assert grid.advance(force, np.zeros((1, 1))).ravel()[1:] == pytest.approx([1.0, 1.0], abs=2e-4)
+    chain, setting = built("open", {})
+    with pytest.raises(ValueError, match="step: expected at most"):
+        integrate_terms(chain, setting, Terms(), duration=1e3, step=100.0, every=1)
+
+
+@each_system
 @pytest.mark.parametrize(
     ("extreme", "named"),
     [
@@ -224,8 +306,6 @@ def test_around_the_list(system, rung, lam, omega, delta, beta, epsilon, preload
     ids=str,
 )  # fmt: skip
 def test_bad_numbers_are_named(system, extreme, named):
-    if "n" in extreme and system in {"unequal", "grid"}:
-        pytest.skip("the lists and rows no longer fit, which is said first")
     with pytest.raises(ValueError, match=named):
         built(system, extreme)
 

@@ -94,6 +94,113 @@ def test_unequal_actuators_agree_with_dop853(ring):
         assert np.max(np.abs(z[:, *at] - wanted)) < 1e-7 * np.max(np.abs(wanted))
 
 
+WIRED = {
+    "both ways": {"both_ways": True},
+    "amplifier": {"kind": "amplifier"},
+    "amplifier ring": {"kind": "amplifier", "ring": True},
+    "down": {"down": True},
+    "down, amplifier": {"down": True, "kind": "amplifier"},
+}
+
+
+def wired(shape, chain_length, *, ring=False, **rest):
+    return GridIntegrator(shape=shape, chain_length=chain_length, beta=-1.0, ring=ring, dtau=0.2, **rest)
+
+
+def pulled(z, lam, lam_y, *, ring=False, both_ways=False, down=False, kind="resistor"):
+    """What the links do to a grid (rows, cols) of chains as long as its rows, an actuator at a time."""
+    rows, cols = z.shape
+    back, force = float(kind == "resistor"), np.zeros(z.shape)
+    for r in range(rows):
+        for c in range(cols):
+            if c or ring:
+                force[r, c] += lam[r, c] * (z[r, c - 1] - back * z[r, c])
+            if both_ways and c + 1 < cols:
+                force[r, c] += lam[r, c + 1] * (z[r, c + 1] - z[r, c])
+            if down and r:
+                force[r, c] += lam_y[r, c] * (z[r - 1, c] - back * z[r, c])
+    return force
+
+
+@pytest.mark.parametrize("name", WIRED)
+def test_every_wiring_agrees_with_dop853(name):
+    how, shape = WIRED[name], (2, 3)
+    force, lam = smooth(150, shape, size=0.02)
+    _, lam_y = smooth(150, shape, seed=1)
+    rng = np.random.default_rng(3)
+    delta, own = rng.uniform(0.02, 0.05, shape), rng.uniform(0.9, 1.2, shape)
+    here = wired(shape, 3, delta=delta, stiffness=own, **how)
+    z = here.advance(force, lam, lam_y) if how.get("down") else here.advance(force, lam)
+    y, wanted = np.zeros(12), [np.zeros(shape)]
+    for k in range(149):
+
+        def slope(tau, y, k=k):
+            part = tau / 0.2
+            now = [(1 - part) * each[k] + part * each[k + 1] for each in (force, lam, lam_y)]
+            q, v = y[:6].reshape(shape), y[6:].reshape(shape)
+            push = now[0] + pulled(q, now[1], now[2], **how)
+            return np.concatenate([v.ravel(), (push - delta * v - own * q + q**3).ravel()])
+
+        y = solve_ivp(slope, (0, 0.2), y, method="DOP853", rtol=1e-11, atol=1e-15).y[:, -1]
+        wanted.append(y[:6].reshape(shape))
+    assert np.abs(wanted).max() > 0.05
+    assert np.abs(z - wanted).max() < 1e-7 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("name", WIRED)
+def test_blocks_do_not_matter_in_any_wiring(name):
+    how, (force, lam), cut = WIRED[name], smooth(60, (3, 40)), [7, 8, 31]
+    downs = (lam[:, ::-1],) if how.get("down") else ()
+    whole, parts = (wired((3, 40), 4, delta=0.02, **how) for _ in range(2))
+    pieces = zip(*(np.split(each, cut) for each in (force, lam, *downs)), strict=True)
+    np.testing.assert_array_equal(
+        np.concatenate([parts.advance(*one) for one in pieces]), whole.advance(force, lam, *downs)
+    )
+
+
+def test_a_grid_without_links_downwards_is_its_rows():
+    force, lam = smooth(200, (4, 6), size=0.01)
+    rows = grid((4, 6), 3).advance(force, lam)
+    whole = wired((4, 6), 3, delta=0.02, down=True)
+    np.testing.assert_allclose(whole.advance(force, lam, np.zeros((4, 6))), rows, rtol=0, atol=1e-12)
+
+
+def test_links_downwards_are_links_along_in_a_turned_grid():
+    force, lam = smooth(200, (3, 4), size=0.01)
+    along, down = wired((3, 4), 4, delta=0.02, down=True), wired((4, 3), 3, delta=0.02, down=True)
+    other = lam[:, ::-1]
+    first = along.advance(force, lam, other)
+    second = down.advance(force.swapaxes(1, 2), other.swapaxes(1, 2), lam.swapaxes(1, 2))
+    np.testing.assert_allclose(second.swapaxes(1, 2), first, rtol=0, atol=1e-13)
+
+
+def test_escape_in_a_grid_with_links_downwards():
+    force = np.zeros((400, 2, 6))
+    force[:, 1, 4] = 0.8
+    here = wired((2, 6), 3, delta=0.02, down=True)
+    z = here.advance(force, np.full((2, 6), 0.1), np.full((2, 6), 0.1))
+    assert (here.escaped.row, here.escaped.col) == (1, 4)
+    assert np.isfinite(z).all()
+    assert not z[:, :, :3].any()
+
+
+@pytest.mark.parametrize(
+    ("how", "complaint"),
+    [
+        ({"ring": True, "down": True}, "down: a 2-D grid is open"),
+        ({"ring": True, "both_ways": True}, "both_ways: an open chain"),
+        ({"kind": "amplifier", "both_ways": True}, "both_ways: an open chain"),
+    ],
+)
+def test_wirings_that_are_not(how, complaint):
+    with pytest.raises(GridError, match=complaint):
+        wired((2, 3), 3, delta=0.02, **how)
+    with pytest.raises(GridError, match="lam_y: missing"):
+        wired((2, 3), 3, delta=0.02, down=True).advance(np.zeros((2, 2, 3)), np.zeros((2, 3)))
+    with pytest.raises(GridError, match="no links downwards"):
+        grid().advance(np.zeros((2, 1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
+
+
 def test_equal_actuators_may_be_given_one_by_one():
     force, lam = smooth(200, (2, 6))
     plain = grid((2, 6), 3).advance(force, lam)
@@ -190,8 +297,8 @@ def test_bad_input_is_refused_by_name():
         grid(dtau=0.0)
     with pytest.raises(GridError, match="beta"):
         grid(beta=np.nan)
-    with pytest.raises(GridError, match=r"delta: expected a number or shape \(1, 3\), got \(3,\)"):
-        grid(delta=np.full(3, 0.1))
+    with pytest.raises(GridError, match=r"delta: .* numbers that fit the shape \(1, 3\), got \(2,\)"):
+        grid(delta=np.full(2, 0.1))
     with pytest.raises(GridError, match="delta: expected numbers >= 0, got -1"):
         grid(delta=-1.0)
     with pytest.raises(GridError, match=r"force: expected shape \(4, 1, 3\)"):

@@ -72,6 +72,20 @@ def test_the_size_of_beta_is_only_a_scale_of_length(rung, strength):
     assert b.error_estimate == pytest.approx(a.error_estimate, rel=1e-3, abs=1e-12)
 
 
+@settings(max_examples=20, deadline=None)
+@given(rung=st.sampled_from(STEADY), closure=st.sampled_from(list(Closure)), power=st.integers(-30, 30))
+def test_a_power_of_four_in_beta_changes_not_a_bit(rung, closure, power):
+    plain, strong = Chain(4, 0.01, -1.0, closure), Chain(4, 0.01, -(4.0**power), closure)
+    forces = {"epsilon": 2e-3, "preload": 0.01, "bias": np.array([0.0, 0.01, -0.02, 0.0])}
+    less = {name: value / 2.0**power for name, value in forces.items()}
+    a = solve(plain, Setting.of(plain, **forces, lam=0.006, omega=1.03), tol=1e-9, rung=rung)
+    b = solve(strong, Setting.of(strong, **less, lam=0.006, omega=1.03), tol=1e-9, rung=rung)
+    for name in ("harmonics", "mean"):
+        assert np.array_equal(getattr(b, name) * 2.0**power, getattr(a, name))
+    for name in ("multipliers", "branch", "error_estimate", "outcome"):
+        assert np.array_equal(getattr(b, name), getattr(a, name))
+
+
 @pytest.mark.parametrize("rung", STEADY)
 def test_a_batch_answers_each_setting_as_alone(rung):
     rng = np.random.default_rng(3)
@@ -94,6 +108,20 @@ def test_equal_rows_give_equal_responses():
     response = solve(chain, setting, tol=1e-6, rung="harmonic_balance")
     assert (response.harmonics == response.harmonics[:1]).all()
     assert (response.multipliers == response.multipliers[:1]).all()
+
+
+@pytest.mark.parametrize("rung", STEADY)
+def test_the_order_of_equal_settings_changes_nothing(rung):
+    chain, rng = Chain(6, DELTA, -1.0), np.random.default_rng(8)
+    kinds = rng.uniform(1e-4, 2e-3, 5)
+    order = rng.permutation(np.repeat(np.arange(5), 16))
+    one, other = (
+        solve(chain, Setting.of(chain, epsilon=kinds[rows], lam=6.131e-3, omega=1.01), tol=1e-6, rung=rung)
+        for rows in (np.sort(order), order)
+    )
+    back = np.argsort(order, kind="stable")
+    assert np.array_equal(one.harmonics, other.harmonics[back])
+    assert np.array_equal(one.multipliers, other.multipliers[back])
 
 
 def test_base_point_of_the_performance_notes():

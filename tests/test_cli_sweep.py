@@ -216,3 +216,39 @@ def test_a_map_needs_two_ranges(source, tmp_path):
     run_sweep(source, tmp_path / "out.npz")
     with pytest.raises(AppError, match="exactly two ranges"):
         draw_map(source, tmp_path / "out.npz", tmp_path / "map.png")
+
+
+def test_a_grid_is_swept_as_it_is_simulated(tmp_path):
+    chain = {"grid": {"rows": 2, "cols": 3}, "delta": 0.05, "beta": [-1.0] * 6}
+    source = tmp_path / "grid.yaml"
+    source.write_text(
+        f"chain: {json.dumps(chain)}\n"
+        "setting: {epsilon: {from: 1.0e-3, to: 1.0e-2, steps: 3}, lam: {from: 0.05, to: 0.1, steps: 2}, omega: 1.1}\n"
+        "rung: harmonic_balance\ntol: 1.0e-8\n"
+    )
+    run_sweep(source, tmp_path / "same.npz")
+    source.write_text(source.read_text().replace("omega", "lam_y: 0.2, omega"))
+    run_sweep(source, tmp_path / "apart.npz")
+    for name, downs in (("same", 0.1), ("apart", 0.2)):
+        setting = {"epsilon": 1e-2, "lam_x": 0.1, "lam_y": downs, "omega": 1.1}
+        one = simulate({"chain": chain, "setting": setting, "rung": "harmonic_balance", "tol": 1e-10})
+        found = load(tmp_path / f"{name}.npz")
+        assert found["outcome"][5] == one["outcome"] == "ok"
+        wanted = np.array([complex(*pair) for pair in one["phasor"]])
+        assert np.abs(found["phasor"][5] - wanted).max() < 2e-8 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("n: 3", "n: 3, grid: {rows: 2, cols: 2}", "give either n"),
+        ("n: 3", "n: 3, kind: magnet", "chain.kind: expected"),
+        ("delta: 6.0e-3", "delta: [6.0e-3, 5.0e-3]", "chain.delta: expected a number or a list of 3"),
+        ("lam: 6.0e-3", "lam: 6.0e-3\n  lam_y: 0.1", "setting.lam_y: only a grid"),
+        ("n: 3", "grid: {rows: 2000, cols: 2000}", "at most 1000000 oscillators"),
+    ],
+)
+def test_chains_that_do_not_fit_together(source, tmp_path, old, new, complaint):
+    source.write_text(TEXT.replace(old, new, 1))
+    with pytest.raises(ProfileError, match=complaint):
+        run_sweep(source, tmp_path / "out.npz")

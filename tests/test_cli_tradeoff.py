@@ -6,9 +6,9 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from dotwave.asked import seconds_of
 from dotwave.cli_plan import plan_app
 from dotwave.errors import AppError
-from dotwave.tradeoff_report import seconds_of
 from planner import PlanError
 
 JOB = """\
@@ -107,7 +107,7 @@ def test_complaints(job, tmp_path):
     with pytest.raises(AppError, match="no frame 7"):
         run("pareto", job, "--frame", "7")
     with pytest.raises(PlanError, match="nothing to trade"):
-        run("pareto", "a", "--device", "paper-6x6")
+        run("pareto", "a", "--device", "paper-6x6-ring")
     with pytest.raises(PlanError, match="tol: expected a number > 0"):
         run("explain", "a", "--tol", "0")
 

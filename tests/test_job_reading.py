@@ -50,7 +50,11 @@ WRONG = {
     "sequence:\n  - texture:\n      wave: {lag_deg: 60, lvl: 1}": "3: sequence.0.texture.wave.lvl: unknown key",
     "sequence:\n  - texture: {dwell_s: 1}": "2: sequence.0.texture: give exactly one of wave, bars, walking_bars",
     "sequence:\n  - texture:\n      levels: [[1, 2]]": "3: sequence.0.texture.levels.0.1: expected a number <= 1.0",
-    "tolerance: high\nsequence: [{pause_s: 1}]": "1: tolerance: expected 'draft', 'normal' or 'fine', got 'high'",
+    "tolerance: high\nsequence: [{pause_s: 1}]": (
+        "1: tolerance: expected 'draft', 'normal', 'fine' or a number > 0 such as 1e-3, got 'high'"
+    ),
+    "tolerance: 0\nsequence: [{pause_s: 1}]": "1: tolerance: expected 'draft', 'normal', 'fine' or a number > 0 such",
+    "tolerance: yes\nsequence: [{pause_s: 1}]": "1: tolerance: expected 'draft', 'normal', 'fine' or a number > 0",
     "budget: {planning_s: 0}\nsequence: [{pause_s: 1}]": "1: budget.planning_s: expected a number > 0.0, got 0",
     "device: nope\nsequence: [{pause_s: 1}]": "1: device: device 'nope': not a built-in profile (",
     "device: {grid: {cols: 0}}\nsequence: [{pause_s: 1}]": (
@@ -162,3 +166,10 @@ def test_samples_fit_the_schema(path: Path) -> None:
 def test_the_schema_refuses_what_the_reader_refuses(text: str) -> None:
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(yaml.safe_load(text), job_schema())
+
+
+@pytest.mark.parametrize(
+    ("words", "tol"), [("draft", 0.1), ("normal", 0.02), ("fine", 0.005), ("1e-3", 1e-3), ("1.0e-3", 1e-3), ("2", 2.0)]
+)
+def test_tolerances_by_name_and_number(tmp_path: Path, words: str, tol: float) -> None:
+    assert read_job(written(tmp_path, f"tolerance: {words}\nsequence: [{{pause_s: 1}}]")).tol == tol

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from chainsim import Chain
+from chainsim import Chain, Spread
 from planner.links import detuning_gain, drive_for, links_for, stage_constant
 
 Floats = NDArray[np.float64]
@@ -119,3 +121,34 @@ def test_noise_gain_against_a_scan_of_all_frequencies(profile: list[float]) -> N
     wanted = scanned_gain(chain, a, lam, 1.35)
     # The planner looks at each stage's own resonance; neighbours pull the true peak a little aside.
     assert 0.7 * wanted <= gain[0] <= wanted * (1 + 1e-6)
+
+
+UNEQUAL = Chain.of(4, delta=[5e-3, 6e-3, 4e-3, 7e-3], beta=[-1.0, -0.5, -2.0, 0.3], stiffness=[1.01, 0.98, 1.03, 0.97])
+
+
+@given(
+    st.lists(st.floats(0.005, 0.05), min_size=4, max_size=4),
+    st.floats(1.2, 1.5),
+)
+def test_oscillators_with_numbers_of_their_own(profile: list[float], omega: float) -> None:
+    """Drive and links put into the equations of one harmonic, oscillator by oscillator, give the profile back."""
+    a = np.array(profile)
+    lam = links_for(UNEQUAL, a, omega)
+    assume(bool(np.isfinite(lam).all()))
+    z = complex(drive_for(UNEQUAL, a[:1], omega)[0])
+    numbers = zip(a, np.append(0.0, lam), UNEQUAL.stiffness, UNEQUAL.deltas, UNEQUAL.betas, strict=True)
+    for m, (size, link, stiffness, delta, beta) in enumerate(numbers):
+        push = z if m == 0 else link * z
+        z = push / (stiffness + link - omega**2 + 0.75 * beta * size**2 + 1j * delta * omega)
+        assert abs(z) == pytest.approx(size, rel=1e-7)
+
+
+def test_equal_oscillators_may_be_said_one_by_one() -> None:
+    """A chain whose numbers are given for each gives what it gives when they are one for all."""
+    one = Chain(6, 5.3006e-3, -1.0)
+    each = replace(one, spread=Spread((5.3006e-3,) * 6, (-1.0,) * 6, (1.0,) * 6))
+    a = 0.05 * np.array([[1, 1, 0.1, 0.1, 1, 1], [0.1, 1, 0.1, 1, 0.1, 1]])
+    np.testing.assert_allclose(links_for(each, a, 1.35), links_for(one, a, 1.35), rtol=1e-13)
+    np.testing.assert_allclose(drive_for(each, a[:, 0], 1.35), drive_for(one, a[:, 0], 1.35), rtol=1e-13)
+    lam = links_for(one, a, 1.35)
+    np.testing.assert_allclose(detuning_gain(each, a, lam, 1.35), detuning_gain(one, a, lam, 1.35), rtol=1e-9)

@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from chainsim import load_device
 from encoders import GridShape, levels, plane_wave, walking_bars
-from planner.pareto import ALIKE, RAMPS_S, RESOLUTION, ParetoError, ParetoPoint, front_of, pareto_of
+from planner.pareto import RAMPS_S, pareto_of
+from planner.pareto_point import ALIKE, RESOLUTION, ParetoError, ParetoPoint, front_of
+from planner.pareto_still import PERIODS, ways_of_deflections
+from planner.wave_state import wave_state
+from planner.wave_ways import enter_wave
+from planner.wish import wishes_of
 
 SHAPE = GridShape(6, 6)
 ROW = [1, 1, 0, 0, 1, 1]
@@ -116,12 +122,76 @@ def test_the_same_frame_gives_the_same_front(single):
     assert pareto_of(frame_of(ROW, ROW), load_device("independent-6x6")) == single
 
 
+def ringing(device, periods, stiffness):
+    """Largest deflection around the mean after a way of full scale of an actuator of another stiffness, linear."""
+    tau = 2 * np.pi * periods * np.linspace(0.0, 1.0, 4001)
+    x = tau / tau[-1]
+    step = sum(
+        (-1) ** k * math.comb(5 + k, k) * math.comb(11, 5 - k) * x ** (6 + k) for k in range(6)
+    )  # fmt: skip
+    slope = np.gradient(step, tau)
+    bend = np.gradient(slope, tau)
+    force = step + device.delta * slope + bend
+    answer = solve_ivp(
+        lambda t, y: [y[1], np.interp(t, tau, force) - device.delta * y[1] - stiffness * y[0]],
+        (0, tau[-1] + 4 * np.pi), [0.0, 0.0], "DOP853", np.linspace(tau[-1], tau[-1] + 4 * np.pi, 400), rtol=1e-9,
+        atol=1e-12, max_step=0.1,
+    )  # fmt: skip
+    return np.ptp(answer.y[0]) / 2
+
+
+def test_deflections_are_traded_by_their_closed_forms():
+    device = load_device("paper-6x6")
+    points, tried = ways_of_deflections(np.array([[1.0, 0.0, 1.0, 0.0, 0.0, 1.0]]), device)
+    assert tried == len(points) == len(PERIODS)
+    still = points[-1].spread
+    # d z/z = -2 df/(1 + 3 beta z^2).
+    assert still == pytest.approx(0.02 / (1 - 3 * device.full_scale**2), rel=0.05)
+    for periods, point in zip(PERIODS, points, strict=True):
+        assert point.ramp_s == pytest.approx(periods / device.f0_hz)
+        assert point.error < 1e-9
+        assert point.drive == pytest.approx(device.full_scale * (1 - device.full_scale**2) / device.bias_max, rel=0.05)
+        rings = math.sqrt(max(point.spread**2 - still**2, 0.0))
+        if periods <= 2:
+            assert rings == pytest.approx(ringing(device, periods, 1.02), rel=0.1, abs=2e-4)
+    found = pareto_of(frame_of(ROW), device)
+    ordered = [point.spread for point in found.points]
+    assert len(ordered) > 1
+    assert ordered == sorted(ordered, reverse=True)
+
+
+def test_deflections_that_cannot_be_held_have_no_way():
+    device = load_device("paper-6x6").model_copy(update={"full_scale": 0.4})
+    assert ways_of_deflections(np.ones((1, 6)), device) == ([], len(PERIODS))
+
+
+def test_waves_trade_time_against_drive():
+    device = load_device("paper-6x6")
+    pattern = plane_wave(SHAPE, lag_deg=60, level=0.2)
+    found = pareto_of(pattern, device)
+    assert len(found.points) > 1
+    for fast, slow in itertools.pairwise(found.points):
+        assert fast.ramp_s < slow.ramp_s
+        assert fast.drive > slow.drive
+    wish = next(iter(wishes_of(pattern, device))).wish
+    planned = enter_wave(device, wave_state(device, wish), True)
+    assert found.points[0].ramp_s == planned.duration_s
+    assert found.points[0].drive == pytest.approx(np.abs(planned.epsilon).max() / device.epsilon_max)
+    assert all(point.error <= 2e-3 for point in found.points)
+
+
+def test_phases_of_uncoupled_actuators_fix_nothing():
+    device = load_device("independent-6x6")
+    wave, flat = plane_wave(SHAPE, lag_deg=90, level=0.5), levels(np.full((6, 6), 0.5))
+    assert pareto_of(wave, device) == pareto_of(flat, device)
+
+
 @pytest.mark.parametrize(
     ("pattern", "device", "words"),
     [
-        (plane_wave(SHAPE, lag_deg=90), "linked-6x6", "phases are part of the wish"),
-        (walking_bars(SHAPE, width=3), "linked-6x6", "phases are part of the wish"),
-        (frame_of(ROW), "paper-6x6", "paper-6x6 has nothing to trade"),
+        (walking_bars(SHAPE, width=3), "linked-6x6", "two tones"),
+        (plane_wave(SHAPE, lag_deg=60, level=0.2), "paper-6x6-ring", "is of rings"),
+        (plane_wave(SHAPE, lag_deg=-90), "paper-6x6", "cannot make it: waves travel away"),
         (frame_of(ROW), "paper-6x6-ring", "has nothing to trade"),
         (frame_of(), "linked-6x6", "nothing is felt"),
     ],

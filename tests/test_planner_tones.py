@@ -204,3 +204,15 @@ def test_the_file_says_which_rows_move(tmp_path: Path) -> None:
     (mark,) = json.loads((tmp_path / "wave.json").read_text())["frames"]
     assert mark["moving"] == [True] * 6
     np.testing.assert_allclose(np.exp(1j * np.array(mark["phase"])), wave.amplitude, atol=1e-6)
+
+
+def test_links_stay_through_a_rest() -> None:
+    """Links that crept up while the chain rests would pass on what is left in it."""
+    still = ChainState(**{**vars(state()), "lam": np.full(2, 0.3), "bias": np.zeros(3), "target": np.ones(3)})
+    down = Ramp(np.array([0.0, 0.5]), lam_t_s=np.array([0.0, 0.5]), lam=np.array([[0.3, 0.3], [0.0, 0.0]]))
+    up = Ramp(np.array([0.0, 0.2]), lam_t_s=np.array([0.0, 0.2]), lam=np.array([[0.5, 0.5], [0.3, 0.3]]))
+    whole = joined(rest_for(down, 1.0), up, still, still)
+    assert whole.lam_t_s is not None
+    assert whole.lam is not None
+    assert np.interp([0.5, 1.0, 1.499], whole.lam_t_s, whole.lam[:, 0]).tolist() == [0.0, 0.0, 0.0]
+    assert np.interp(1.501, whole.lam_t_s, whole.lam[:, 0]) == pytest.approx(0.5, abs=2e-3)

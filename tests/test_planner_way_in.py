@@ -15,9 +15,10 @@ from scipy.interpolate import CubicHermiteSpline
 from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device
 from planner.plan import Ramp
 from planner.refine import refine
-from planner.steering import LinkCourse, Standing, Steering
-from planner.way_in import find_fall, find_way
+from planner.steering import LinkCourse, Standing, Steering, rest
+from planner.way_in import find_way
 from planner.way_limits import WayError, WayLimits
+from planner.way_out import find_fall
 from planner.way_search import Search
 
 Floats = NDArray[np.float64]
@@ -227,7 +228,7 @@ def test_every_link_may_have_its_own_course() -> None:
 
 def test_the_budget_is_kept() -> None:
     omega, held = wave(120, 0.07)
-    search = Search(PAPER.chain, held, omega, LIMITS, TAU_PER_S, 9)
+    search = Search(PAPER.chain, rest(held.lam), held, omega, LIMITS, TAU_PER_S, 9)
     assert search.shorter_and_shorter()
     assert search.spent <= 9
 
@@ -262,7 +263,7 @@ def test_a_fall_leaves_a_thousandth(lag: float, scope: str) -> None:
     ramp = paper_way(lag, 0.07)
     fall = find_fall(
         PAPER.chain, epsilon=held.epsilon, lam=held.lam, omega=omega, phasor=held.phasor, limits=limits,
-        tau_per_s=TAU_PER_S,
+        tau_per_s=TAU_PER_S, budget=BUDGET,
     )  # fmt: skip
     assert not fall.lacking
     begins_s = ramp.duration_s + 0.3
@@ -294,9 +295,10 @@ def test_what_makes_no_sense_is_refused() -> None:
 
 def test_slopes_of_drive_and_links_belong_to_them() -> None:
     _, held = wave(120, 0.07)
-    task = Steering(PAPER.chain, 1.0, held, LinkCourse(0.05, 0.25), 300.0)
+    start = Standing(0.7j * held.epsilon, 2 * held.lam, 1.3 * held.phasor, turning=0.01)
+    task = Steering(PAPER.chain, 1.0, start, held, LinkCourse(0.05, 0.25), 300.0)
     x, h = np.linspace(0.0, 1.0, 997), 1e-6
     unknowns = np.random.default_rng(3).normal(size=(2, task.size))
-    for curve in (lambda at: task.drive(at, unknowns), lambda at: task.links.at(at, held.lam)):
+    for curve in (lambda at: task.drive(at, unknowns), lambda at: task.links.at(at, start, held)):
         slope = (curve(x + h)[0] - curve(x - h)[0]) / (2 * h)
         np.testing.assert_allclose(curve(x)[1][1:-1], slope[1:-1], atol=1e-4 * np.abs(slope).max())

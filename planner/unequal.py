@@ -1,0 +1,163 @@
+"""Chains whose actuators were measured: each kind of chain is planned as a device of its own."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device, Outcome
+from encoders import TargetPattern
+
+from .chains import MOST_STATES, Chains
+from .held import Held
+from .plan import ChainState, Ramp
+from .strategy import Strategy, strategy_for
+from .wish import wishes_of
+
+__all__ = ["UnequalChains"]
+
+Floats = NDArray[np.float64]
+
+# Links that must be set beyond their range by less than this part of it are set to its end.
+SLACK = 1e-9
+# Largest change of a wave's motion, relative to its largest amplitude, by links that differ under one lam.
+TOLD = 5e-4
+
+
+class UnequalChains(Chains):
+    """As `Chains`, with the numbers of each chain; chains of the same numbers are one kind, planned once."""
+
+    def __init__(self, device: Device, contrast_db: float) -> None:
+        super().__init__(device, contrast_db)
+        self._alone: list[Device] = []
+        self._units: list[Floats | float] = []
+        self._kind_at: list[int] = []
+        known: dict[str, int] = {}
+        for row in range(device.rows):
+            for index in range(device.chains_per_row):
+                alone = device.alone(row, index)
+                kind = known.setdefault(alone.model_dump_json(), len(known))
+                if kind == len(self._alone):
+                    self._alone.append(alone)
+                    own = device.coupling.scope == "link"
+                    self._units.append(device.lam_gain(row, index) if own else device.lam_unit(row, index))
+                self._kind_at.append(kind)
+        self._chains = [Chains(alone, contrast_db, self, kind) for kind, alone in enumerate(self._alone)]
+        self._set: dict[Held, ChainState] = {}
+        self._set_ramps: dict[tuple[Held, Held, bool, float], Ramp | None] = {}
+
+    @cached_property
+    def strategy(self) -> Strategy | None:
+        """The way to make amplitudes at will, with what all kinds of chain have in common."""
+        return strategy_for(self.device, self._contrast_db, self._alone)
+
+    @property
+    def at_rest(self) -> list[Held]:
+        """All chains of the device at rest."""
+        return [self._chains[kind].rest for kind in self._kind_at]
+
+    def hold(self, pattern: TargetPattern, before: list[Held]) -> list[Held]:
+        """What chains hold for a pattern, given what they held."""
+        wishes = zip(self._kind_at, wishes_of(pattern, self.device), before, strict=True)
+        held = [self._chains[kind]._hold(wish, one) for kind, wish, one in wishes]
+        keys = defaultdict(list)
+        for one in held:
+            keys[one.kind].append(one.key)
+        for kind, of_kind in keys.items():
+            self._chains[kind]._plan(of_kind)
+        return held
+
+    def state(self, held: Held) -> ChainState:
+        """The state for what is held, as the device is set to it."""
+        if held not in self._set:
+            if len(self._set) >= MOST_STATES:
+                self._set.clear()
+            self._set[held] = self._state(held.kind, self._chains[held.kind].state(held))
+        return self._set[held]
+
+    def _state(self, kind: int, state: ChainState) -> ChainState:
+        gain, span = self._drive(kind), self.device.coupling.lam
+        tones = tuple(replace(tone, epsilon=tone.epsilon * gain) for tone in state.tones)
+        lam = state.lam / self._units[kind]
+        if not state.moving:
+            # What stands still is held under the smallest lam, whatever links make of it.
+            lam = np.full_like(lam, span.min)
+        done = replace(state, epsilon=state.epsilon * gain, tones=tones, lam=np.clip(lam, span.min, span.max))
+        if done.outcome is Outcome.OK and self._beyond(lam):
+            lacking = f"it takes links set to {lam.min():.3g}..{lam.max():.3g}; it lacks range of lam"
+            return replace(done, outcome=Outcome.UNREACHABLE, lacking=lacking)
+        return self._under_one_lam(kind, state, done)
+
+    def _under_one_lam(self, kind: int, state: ChainState, done: ChainState) -> ChainState:
+        """A wave as it is when links differ that have one lam: it was planned for their mean."""
+        device = self._alone[kind]
+        gain = device.lam_gain(0)
+        if device.coupling.scope == "link" or not state.epsilon or state.tones or np.all(gain == 1.0):
+            return done
+        from .fit import Hold, response_to
+
+        real = response_to(device.chain, Hold(state.epsilon, state.lam * gain, state.omega), state.phasor).phasor[0]
+        away = float(np.abs(real - state.phasor).max())
+        if away <= TOLD * float(np.abs(state.phasor).max()):
+            return replace(done, error=done.error + away / device.full_scale)
+        spread = f"{100 * float(np.abs(gain - 1).max()):.2g} %"
+        return replace(
+            done, phasor=real, error=done.error + away / device.full_scale, outcome=Outcome.UNREACHABLE,
+            lacking=f"its links differ by up to {spread} under one lam; it lacks a lam per link",
+        )  # fmt: skip
+
+    def _drive(self, kind: int) -> float:
+        """What a force is called in units of the profile."""
+        return self.device.epsilon_per_volt / self._alone[kind].epsilon_per_volt
+
+    def _beyond(self, lam: Floats) -> bool:
+        span = self.device.coupling.lam
+        slack = SLACK * (span.max - span.min)
+        return bool(lam.size and (lam.min() < span.min - slack or lam.max() > span.max + slack))
+
+    def under(self, held: Held, lam: float) -> Held:
+        """What is held, with its links given as they are set."""
+        return self._chains[held.kind].under(held, lam * float(np.mean(self._units[held.kind])))
+
+    def ramp(self, before: Held, after: Held, moves: bool, wait_s: float = 0.0) -> Ramp | None:
+        """The way from one to the other, as the device is set on it; None where a chain already stands."""
+        ask = (before, after, moves, wait_s)
+        if ask not in self._set_ramps:
+            if len(self._set_ramps) >= MOST_STATES:
+                self._set_ramps.clear()
+            ramp = self._chains[before.kind].ramp(*ask)
+            self._set_ramps[ask] = None if ramp is None else self._ramp(before.kind, ramp)
+        return self._set_ramps[ask]
+
+    def _ramp(self, kind: int, ramp: Ramp) -> Ramp:
+        gain, span = self._drive(kind), self.device.coupling.lam
+        tones = tuple(
+            replace(
+                tone, epsilon=tone.epsilon * gain,
+                epsilon_slope=None if tone.epsilon_slope is None else tone.epsilon_slope * gain,
+            )
+            for tone in ramp.tones
+        )  # fmt: skip
+        ramp = replace(
+            ramp, tones=tones, epsilon=None if ramp.epsilon is None else ramp.epsilon * gain,
+            epsilon_slope=None if ramp.epsilon_slope is None else ramp.epsilon_slope * gain,
+        )  # fmt: skip
+        if ramp.lam is None:
+            return ramp
+        lam = ramp.lam / self._units[kind]
+        lacking = ramp.lacking
+        if not lacking and self._beyond(lam):
+            lacking = f"the change takes links set to {lam.min():.3g}..{lam.max():.3g}; it lacks range of lam"
+        return replace(ramp, lam=np.clip(lam, span.min, span.max), lacking=lacking)
+
+    def prepare(self, pairs: list[tuple[Held, Held]], moves: bool) -> None:
+        """Plan many ways between amplitudes at once."""
+        of_kind = defaultdict(list)
+        for pair in pairs:
+            of_kind[pair[0].kind].append(pair)
+        for kind, same in of_kind.items():
+            self._chains[kind].prepare(same, moves)
