@@ -49,7 +49,8 @@ class GridIntegrator:
     ----------
     shape : rows and columns of the grid. chain_length : actuators a chain; divides the columns.
     delta, beta, stiffness : of `Chain`, a number, or float64 that fits (rows, cols): one for each actuator. The
-        stiffness is the natural frequency squared, in units of f0. ring : whether each chain's last actuator feeds its first.
+        stiffness is the natural frequency squared, in units of f0.
+    ring : whether each chain's last actuator feeds its first.
     both_ways : whether every link also acts on the actuator before it. down : whether the chains of all rows that
         stand one above another are one 2-D grid, each actuator also fed from the one above it. kind : of every link;
         an amplifier pushes without pulling back, one way only.
