@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from problem import CHAIN, PERIODS, median_error, settings
 
 from chainsim import Chain, Setting, solve
-from chainsim.scaled import in_threads, scaled
-from chainsim.splitting import WIDTH, advance_block, forcing_table
-from chainsim.sweeps import OUTCOMES, sweep
+from chainsim.motion.splitting import WIDTH, advance_block, forcing_table
+from chainsim.steady.scaled import in_threads, scaled
+from chainsim.sweeping.sweeps import OUTCOMES, sweep
 
 __all__ = ["ALONE", "lengths", "map_of_settings", "one_alone", "states_after", "steady", "timed", "transients"]
 

@@ -14,18 +14,15 @@ from .rung import RUNGS, Rung, RungError, Start, load_rung
 from .yamlfile import parse_model, read_model
 
 if TYPE_CHECKING:
-    from .as_built import AsBuilt
-    from .continuation import continue_branch
-    from .envelope import follow
-    from .envelope_decide import Decision, decide
-    from .harmonic_balance import balance_near
-    from .integrate import Escape, GridError, GridIntegrator
-    from .joint_branches import Branches, joint_branches
     from .ladder import solve
-    from .ode import Reached, reached_from_rest, steady_from_ramp, steady_from_rest
-    from .sensitivity import Gradient, gradient
+    from .motion.as_built import AsBuilt
+    from .motion.integrate import Escape, GridError, GridIntegrator
+    from .motion.ode import Reached, reached_from_rest, steady_from_ramp, steady_from_rest
     from .simulate_io import Simulation, parse_simulation, read_simulation, simulate
-    from .spectrum import (
+    from .slow.envelope import follow
+    from .slow.envelope_decide import Decision, decide
+    from .stability.continuation import continue_branch
+    from .stability.spectrum import (
         critical_lam,
         delta_from_critical_lam,
         gain_per_stage,
@@ -33,13 +30,16 @@ if TYPE_CHECKING:
         rest_eigenvalues,
         spectrum_curve,
     )
-    from .sweep_file import SettingSweep, read_sweep
-    from .sweeps import SweepResult, sweep, unit_of
-    from .terms import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone, bending_modes, modulated
-    from .terms_ode import integrate_terms
-    from .terms_rungs import solve_with_terms
-    from .terms_steady import Steady, steady_with_terms
-    from .terms_tones import two_tones
+    from .steady.harmonic_balance import balance_near
+    from .steady.joint_branches import Branches, joint_branches
+    from .steady.sensitivity import Gradient, gradient
+    from .sweeping.sweep_file import SettingSweep, read_sweep
+    from .sweeping.sweeps import SweepResult, sweep, unit_of
+    from .terms.terms import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone, bending_modes, modulated
+    from .terms.terms_ode import integrate_terms
+    from .terms.terms_rungs import solve_with_terms
+    from .terms.terms_steady import Steady, steady_with_terms
+    from .terms.terms_tones import two_tones
 
 __all__ = [
     "RUNGS",
@@ -119,53 +119,53 @@ __all__ = [
 ]
 
 _LATE = {
-    "steady_from_ramp": "ode",
-    "decide": "envelope_decide",
-    "Decision": "envelope_decide",
-    "modulated": "terms",
-    "bending_modes": "terms",
-    "Play": "terms",
-    "Mode": "terms",
-    "Creep": "terms",
-    "BoucWen": "terms",
-    "AmplifierDynamics": "terms",
-    "steady_with_terms": "terms_steady",
-    "Steady": "terms_steady",
-    "solve_with_terms": "terms_rungs",
-    "joint_branches": "joint_branches",
-    "Branches": "joint_branches",
-    "AsBuilt": "as_built",
-    "Tone": "terms",
-    "follow": "envelope",
-    "two_tones": "terms_tones",
-    "integrate_terms": "terms_ode",
-    "Terms": "terms",
-    "peak_gain": "spectrum",
-    "gain_per_stage": "spectrum",
-    "rest_eigenvalues": "spectrum",
-    "spectrum_curve": "spectrum",
-    "delta_from_critical_lam": "spectrum",
-    "critical_lam": "spectrum",
-    "continue_branch": "continuation",
-    "SettingSweep": "sweep_file",
-    "read_sweep": "sweep_file",
-    "SweepResult": "sweeps",
-    "sweep": "sweeps",
-    "unit_of": "sweeps",
-    "Escape": "integrate",
-    "Gradient": "sensitivity",
-    "GridError": "integrate",
-    "GridIntegrator": "integrate",
-    "Reached": "ode",
+    "steady_from_ramp": "motion.ode",
+    "decide": "slow.envelope_decide",
+    "Decision": "slow.envelope_decide",
+    "modulated": "terms.terms",
+    "bending_modes": "terms.terms",
+    "Play": "terms.terms",
+    "Mode": "terms.terms",
+    "Creep": "terms.terms",
+    "BoucWen": "terms.terms",
+    "AmplifierDynamics": "terms.terms",
+    "steady_with_terms": "terms.terms_steady",
+    "Steady": "terms.terms_steady",
+    "solve_with_terms": "terms.terms_rungs",
+    "joint_branches": "steady.joint_branches",
+    "Branches": "steady.joint_branches",
+    "AsBuilt": "motion.as_built",
+    "Tone": "terms.terms",
+    "follow": "slow.envelope",
+    "two_tones": "terms.terms_tones",
+    "integrate_terms": "terms.terms_ode",
+    "Terms": "terms.terms",
+    "peak_gain": "stability.spectrum",
+    "gain_per_stage": "stability.spectrum",
+    "rest_eigenvalues": "stability.spectrum",
+    "spectrum_curve": "stability.spectrum",
+    "delta_from_critical_lam": "stability.spectrum",
+    "critical_lam": "stability.spectrum",
+    "continue_branch": "stability.continuation",
+    "SettingSweep": "sweeping.sweep_file",
+    "read_sweep": "sweeping.sweep_file",
+    "SweepResult": "sweeping.sweeps",
+    "sweep": "sweeping.sweeps",
+    "unit_of": "sweeping.sweeps",
+    "Escape": "motion.integrate",
+    "Gradient": "steady.sensitivity",
+    "GridError": "motion.integrate",
+    "GridIntegrator": "motion.integrate",
+    "Reached": "motion.ode",
     "Simulation": "simulate_io",
-    "balance_near": "harmonic_balance",
-    "gradient": "sensitivity",
+    "balance_near": "steady.harmonic_balance",
+    "gradient": "steady.sensitivity",
     "parse_simulation": "simulate_io",
-    "reached_from_rest": "ode",
+    "reached_from_rest": "motion.ode",
     "read_simulation": "simulate_io",
     "simulate": "simulate_io",
     "solve": "ladder",
-    "steady_from_rest": "ode",
+    "steady_from_rest": "motion.ode",
 }
 
 

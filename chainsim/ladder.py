@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .answer import Answer, response_of, stitch
-from .basis import basis_for
 from .chain import Chain, Setting
-from .harmonic_balance import balance_near
-from .long import LONG, low_alone
+from .motion.rest import sure_from_rest
 from .response import Outcome, Response, Stats
-from .rest import sure_from_rest
 from .rung import MAX_PERIODS, Start, load_rung
-from .scaling import Stages
+from .steady.answer import Answer, response_of, stitch
+from .steady.basis import basis_for
+from .steady.harmonic_balance import balance_near
+from .steady.long import LONG, low_alone
+from .steady.scaling import Stages
 
 __all__ = ["solve"]
 
@@ -67,7 +67,7 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
     steady = _cheapest(chain, setting, tol, way)
     if way is Start.REST:
         return _from_rest(chain, setting, tol, steady)
-    from .envelope_ramp import from_ramp
+    from .slow.envelope_ramp import from_ramp
 
     return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
 
@@ -152,7 +152,7 @@ def _held(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]
 
 def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArray[np.intp], Response]]:
     """What is reached from rest: integrated until sure, then refined by harmonic balance beside that orbit."""
-    from .ode import reached_from_rest, steady_from_rest
+    from .motion.ode import reached_from_rest, steady_from_rest
 
     reached = reached_from_rest(chain, setting, max_periods=MAX_PERIODS)
     ok = reached.outcome == Outcome.OK

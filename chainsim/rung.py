@@ -16,12 +16,12 @@ from .response import Response
 __all__ = ["MAX_PERIODS", "RUNGS", "Rung", "RungError", "Start", "load_rung"]
 
 RUNGS = {
-    "static": ("chainsim.static", "StaticRung"),
-    "linear": ("chainsim.linear", "LinearRung"),
-    "one_harmonic": ("chainsim.one_harmonic", "OneHarmonicRung"),
-    "harmonic_balance": ("chainsim.harmonic_balance", "HarmonicBalanceRung"),
-    "envelope": ("chainsim.envelope_rung", "EnvelopeRung"),
-    "ode": ("chainsim.ode", "OdeRung"),
+    "static": ("chainsim.steady.static", "StaticRung"),
+    "linear": ("chainsim.steady.linear", "LinearRung"),
+    "one_harmonic": ("chainsim.steady.one_harmonic", "OneHarmonicRung"),
+    "harmonic_balance": ("chainsim.steady.harmonic_balance", "HarmonicBalanceRung"),
+    "envelope": ("chainsim.slow.envelope_rung", "EnvelopeRung"),
+    "ode": ("chainsim.motion.ode", "OdeRung"),
 }
 
 

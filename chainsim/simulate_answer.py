@@ -12,10 +12,10 @@ from .chain import Chain, Setting
 from .ladder import solve
 from .response import Outcome, Response, Stats
 from .rung import RungError, Start
-from .terms import Terms
+from .terms.terms import Terms
 
 if TYPE_CHECKING:
-    from .terms_steady import Beat
+    from .terms.terms_steady import Beat
 
 __all__ = ["plain_of", "plain_with_terms"]
 
@@ -50,7 +50,7 @@ def plain_with_terms(
     RungError
         When the rung does not carry the terms.
     """
-    from .terms_rungs import solve_with_terms
+    from .terms.terms_rungs import solve_with_terms
 
     found = solve_with_terms(chain, setting, terms, tol=tol, rung=rung, start=start)
     tones = found.lines.index.shape[1]
@@ -92,7 +92,7 @@ def _every_branch(chain: Chain, setting: Setting, *, tol: float, rung: str) -> d
         response = solve(chain, setting, tol=tol, rung=rung, start=Start.ALL)
         complete = _is_complete(chain, setting, response)
     else:
-        from .joint_branches import joint_branches
+        from .steady.joint_branches import joint_branches
 
         name = rung if rung != "auto" else "harmonic_balance" if setting.epsilon.any() else "static"
         found = joint_branches(chain, setting, tol=tol, rung=name)
@@ -114,7 +114,7 @@ def _is_complete(chain: Chain, setting: Setting, response: Response) -> bool:
 
 def _beat(chain: Chain, setting: Setting, start: Start) -> dict[str, Any] | None:
     """What a motion that does not lock does instead; None where that is not seen."""
-    from .terms_steady import steady_with_terms
+    from .terms.terms_steady import steady_with_terms
 
     try:
         found = steady_with_terms(chain, setting, Terms(), tol=CLEAR, start=start)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from .chain import Setting
-from .terms import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone
+from .terms.terms import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone
 
 __all__ = ["TermsSection"]
 

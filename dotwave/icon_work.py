@@ -39,7 +39,7 @@ def code_digest() -> str:
     """Digest of the code that does the work: what another version made is not used."""
     digest = hashlib.sha256()
     here = Path(__file__)
-    for path in (here, *(path for one in PACKAGES for path in sorted((here.parent.parent / one).glob("*.py")))):
+    for path in (here, *(path for one in PACKAGES for path in sorted((here.parent.parent / one).rglob("*.py")))):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 

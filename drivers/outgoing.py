@@ -9,6 +9,7 @@ from heapq import merge
 
 import numpy as np
 
+from .channels import Role
 from .errors import DriverError
 from .gate import Gate, GateLimits
 from .manifest import Manifest
@@ -17,6 +18,7 @@ from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
 from .samples import SampleReader
+from .shaping import Shaper
 
 __all__ = ["End", "Message", "UnfitController", "check_fit", "session_messages"]
 
@@ -83,9 +85,9 @@ def session_messages(
 ) -> Iterator[Message]:
     """START, then samples with the events before the samples they belong to, then END.
 
-    A sample becomes the nearest of 65535 codes: it is off by at most full_volts / 65534. Links become the
-    nearest multiple of lam_step; times of events the nearest sample. Every block passes the safety gate again
-    before it is sent.
+    A sample becomes one of 65535 codes: a constant voltage the nearest, a drive one within two steps, so that the
+    error lies high above the resonances (`Shaper`). Links become the nearest multiple of lam_step; times of events
+    the nearest sample. Every block passes the safety gate again before it is sent.
 
     Raises
     ------
@@ -107,13 +109,16 @@ def _messages(
     event = next(waiting, None)
     most = Samples.most(found.channels, found.max_payload)
     block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * manifest.rate_hz)))
-    first = 0
+    drives = [channel.index for channel in manifest.channels if channel.role is Role.DRIVE]
+    shaper, first = Shaper(len(drives)), 0
     for volts in reader.blocks(block):
         gate.check(volts)
         while event is not None and event.at < first + len(volts):
             yield event
             event = next(waiting, None)
-        codes = np.rint(volts * (FULL_CODE / found.full_volts)).clip(-FULL_CODE, FULL_CODE)
+        codes = volts * (FULL_CODE / found.full_volts)
+        codes[:, drives] = shaper.round(codes[:, drives].T).T
+        codes = np.rint(codes).clip(-FULL_CODE, FULL_CODE)
         yield Samples(first, codes.astype(np.int16))
         first += len(volts)
     yield End(first)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from chainsim import Device
 from planner import ChainState, FramePlan, Plan, Ramp
 
-from .channels import Channel, channels_of
+from .channels import Channel, Role, channels_of
 from .curve import curve
 from .hold import hold_inverse
+from .shaping import Shaper
 from .timeline import Stretch, stretches
 
 __all__ = ["Waveform"]
@@ -33,7 +34,8 @@ class Waveform:
     The drive of a chain is ``Re(E(t) e^{i omega tau}) / epsilon_per_volt`` volts, summed over its tones,
     tau = 2 pi f0_hz t, with E the ramp's envelope while it lasts and the state's epsilon after it; the bias of an
     actuator is ``b(t) / bias_per_volt``. The time of sample k is k / rate_hz, counted from the start of the plan.
-    Where the converter has steps, the nearest is taken.
+    Where the converter has steps, drives are rounded to them with the error pushed up in frequency (`Shaper`), constant
+    voltages to the nearest.
 
     Attributes
     ----------
@@ -95,9 +97,17 @@ class Waveform:
         # Chunks are cut at the same samples for every block size, so that vector instructions meet the same
         # numbers at the same places and round them in the same way.
         size = max(256, CHUNK_VALUES // len(self.channels))
+        drives = sum(channel.role is Role.DRIVE for channel in self.channels)
+        step, shaper = self.device.amplifier.volt_step, Shaper(drives)
         for stretch in stretches(self.device, self.frames):
             for first in range(stretch.first, stretch.stop, size):
-                yield self._chunk(stretch, np.arange(first, min(first + size, stretch.stop)))
+                chunk = self._chunk(stretch, np.arange(first, min(first + size, stretch.stop)))
+                if step:
+                    chunk /= step
+                    chunk[:drives] = shaper.round(chunk[:drives])
+                    np.rint(chunk[drives:], out=chunk[drives:])
+                    chunk *= step
+                yield chunk
 
     def _chunk(self, stretch: Stretch, index: NDArray[np.intp]) -> Floats:
         frame, device = stretch.plan, self.device
@@ -122,9 +132,6 @@ class Waveform:
             biases = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
             for state, ramp, rows in zip(frame.states, frame.ramps, biases, strict=True):
                 _bias(state, ramp, since_s, device.bias_per_volt, rows)
-        if step := device.amplifier.volt_step:
-            np.rint(out / step, out=out)
-            out *= step
         return out
 
 

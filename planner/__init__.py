@@ -10,16 +10,26 @@ from .plan import ChainState, FramePlan, Margins, Plan, Ramp, Tone, ToneRamp
 from .scene_plan import DEFAULT_CONTRAST_DB, plan_scene
 
 if TYPE_CHECKING:
-    from .calibration import ChainFit, Sweep, SweepError, fit_chain
-    from .climbing import climb
-    from .outlook import FrameSpread, TradePoint
-    from .pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
-    from .questions import Question, TradeoffError, questions_of, seconds_words
-    from .requirement import Requirement, RequirementError, Term, require
-    from .robust import Accuracy, Held, RobustError, RobustPlan, TradeRow, Trial, accuracy_needed, hold, robust_plan
-    from .spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
+    from .price.climbing import climb
+    from .price.pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
+    from .price.questions import Question, TradeoffError, questions_of, seconds_words
+    from .price.requirement import Requirement, RequirementError, Term, require
+    from .price.tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
+    from .spreading.calibration import ChainFit, Sweep, SweepError, fit_chain
+    from .spreading.outlook import FrameSpread, TradePoint
+    from .spreading.robust import (
+        Accuracy,
+        Held,
+        RobustError,
+        RobustPlan,
+        TradeRow,
+        Trial,
+        accuracy_needed,
+        hold,
+        robust_plan,
+    )
+    from .spreading.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
     from .surroundings import HigherMode, Surroundings, assumed
-    from .tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
 
 __all__ = [
     "DEFAULT_CONTRAST_DB",
@@ -80,48 +90,48 @@ __all__ = [
 ]
 
 _LATE = {
-    "TradePoint": "outlook",
-    "FrameSpread": "outlook",
-    "pareto_of": "pareto",
-    "front_of": "pareto",
-    "ParetoPoint": "pareto",
-    "ParetoFront": "pareto",
-    "ParetoError": "pareto",
-    "trade_off": "tradeoff",
-    "TradeoffRow": "tradeoff",
-    "Tradeoff": "tradeoff",
-    "Choice": "tradeoff",
-    "climb": "climbing",
-    "seconds_words": "questions",
-    "questions_of": "questions",
-    "TradeoffError": "questions",
-    "Question": "questions",
+    "TradePoint": "spreading.outlook",
+    "FrameSpread": "spreading.outlook",
+    "pareto_of": "price.pareto",
+    "front_of": "price.pareto",
+    "ParetoPoint": "price.pareto",
+    "ParetoFront": "price.pareto",
+    "ParetoError": "price.pareto",
+    "trade_off": "price.tradeoff",
+    "TradeoffRow": "price.tradeoff",
+    "Tradeoff": "price.tradeoff",
+    "Choice": "price.tradeoff",
+    "climb": "price.climbing",
+    "seconds_words": "price.questions",
+    "questions_of": "price.questions",
+    "TradeoffError": "price.questions",
+    "Question": "price.questions",
     "assumed": "surroundings",
     "Surroundings": "surroundings",
     "HigherMode": "surroundings",
-    "require": "requirement",
-    "Term": "requirement",
-    "RequirementError": "requirement",
-    "Requirement": "requirement",
-    "Accuracy": "robust",
-    "ChainFit": "calibration",
-    "Held": "robust",
-    "RobustError": "robust",
-    "RobustPlan": "robust",
-    "Spread": "spread",
-    "SpreadError": "spread",
-    "SpreadReport": "spread",
-    "Sweep": "calibration",
-    "SweepError": "calibration",
-    "TradeRow": "robust",
-    "Trial": "robust",
-    "Wish": "spread",
-    "accuracy_needed": "robust",
-    "fit_chain": "calibration",
-    "hold": "robust",
-    "robust_plan": "robust",
-    "spread_of": "spread",
-    "wish_of": "spread",
+    "require": "price.requirement",
+    "Term": "price.requirement",
+    "RequirementError": "price.requirement",
+    "Requirement": "price.requirement",
+    "Accuracy": "spreading.robust",
+    "ChainFit": "spreading.calibration",
+    "Held": "spreading.robust",
+    "RobustError": "spreading.robust",
+    "RobustPlan": "spreading.robust",
+    "Spread": "spreading.spread",
+    "SpreadError": "spreading.spread",
+    "SpreadReport": "spreading.spread",
+    "Sweep": "spreading.calibration",
+    "SweepError": "spreading.calibration",
+    "TradeRow": "spreading.robust",
+    "Trial": "spreading.robust",
+    "Wish": "spreading.spread",
+    "accuracy_needed": "spreading.robust",
+    "fit_chain": "spreading.calibration",
+    "hold": "spreading.robust",
+    "robust_plan": "spreading.robust",
+    "spread_of": "spreading.spread",
+    "wish_of": "spreading.spread",
 }
 
 

@@ -42,7 +42,7 @@ def _code_digest() -> bytes:
     digest = hashlib.sha256()
     here = Path(__file__).parent
     for folder in (here, here.parent / "chainsim"):
-        for path in sorted(folder.glob("*.py")):
+        for path in sorted(folder.rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.digest()
 

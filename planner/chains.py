@@ -13,9 +13,9 @@ from encoders import TargetPattern
 
 from .cache import PlanCache
 from .held import Held
-from .joining import as_tone, joined, rest_for, turned_ramp, turned_state
 from .plan import ChainState, Margins, Ramp
 from .strategy import Strategy, strategy_for
+from .ways.joining import as_tone, joined, rest_for, turned_ramp, turned_state
 from .wish import ChainWish, Turned, wishes_of
 
 __all__ = ["Chains", "Held"]
@@ -143,8 +143,8 @@ class Chains:
         return made
 
     def _wave(self, key: bytes) -> ChainState:
-        from .walking import walking_state
-        from .wave_state import wave_state
+        from .waves.walking import walking_state
+        from .waves.wave_state import wave_state
 
         wish = ChainWish.of_key(key)
         assert wish is not None
@@ -192,7 +192,7 @@ class Chains:
 
         one_tone = not (ends[0].tones or ends[1].tones) and bool(ends[0].epsilon) and bool(ends[1].epsilon)
         if one_tone and self.device.chain_length > 1 and self.device.coupling.closure is Closure.OPEN:
-            from .rest_between import rested
+            from .ways.rest_between import rested
 
             return rested(self.device, *ends, whole)
         return whole(0.0)
@@ -233,7 +233,7 @@ class Chains:
         return [self._wave_way(pair) for pair in pairs]
 
     def _wave_way(self, pair: _Pair) -> Ramp | None:
-        from .wave_ways import enter_wave, leave_wave
+        from .ways.wave_ways import enter_wave, leave_wave
 
         enters = pair.before == self.rest.key
         state = self.state(Held(pair.after if enters else pair.before))

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Response
 
-from .fit import Hold
-from .links import stages
+from .levels.links import stages
 from .plan import Margins
+from .waves.fit import Hold
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
 
@@ -46,7 +46,8 @@ def lacking_of(margins: Margins) -> str:
 def converter_error(device: Device, hold: Hold) -> float:
     """Standard deviation of the worst actuator's amplitude under the rounding of a converter, dimensionless.
 
-    Rounding adds noise of step^2/12, spread evenly up to half the rate; small motions pass it on stage by stage.
+    Rounding adds noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error
+    feedback, `drivers.Waveform`); small motions pass it on stage by stage.
     """
     step = device.amplifier.volt_step * device.epsilon_per_volt
     if not step:
@@ -63,5 +64,6 @@ def converter_error(device: Device, hold: Hold) -> float:
     gain = np.abs(np.cumprod(forward[:, None] / stage, axis=0)) ** 2
     if device.coupling.closure is Closure.RING:
         gain = gain / np.abs(1 - np.prod(lam[:, None] / stage, axis=0)) ** 2
-    density = step**2 / 12 / (np.pi * device.amplifier.rate_hz / device.tau_per_s)
-    return float(np.sqrt(density * np.trapezoid(gain, omega, axis=1).max()))
+    rate = device.amplifier.rate_hz / device.tau_per_s
+    density = step**2 / 12 / (np.pi * rate) * (2 * np.sin(omega / rate / 2)) ** 4
+    return float(np.sqrt(np.trapezoid(density * gain, omega, axis=1).max()))

@@ -65,11 +65,11 @@ def strategy_for(
         such a device when `device` is one of them.
     """
     if device.bias == "actuator":
-        from .deflection import Deflection
+        from .levels.deflection import Deflection
 
         return Deflection(device)
     if device.chain_length == 1 or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN):
-        from .vibration import Vibration
+        from .levels.vibration import Vibration
 
         return Vibration(device, contrast_db, kinds, whole if isinstance(whole, Vibration) else None)
     return None

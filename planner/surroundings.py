@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from chainsim import Device
 
-from .spread import Spread, known_spread
+from .spreading.spread import Spread, known_spread
 
 __all__ = ["HigherMode", "Surroundings", "assumed"]
 

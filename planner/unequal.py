@@ -98,7 +98,7 @@ class UnequalChains(Chains):
         gain = device.lam_gain(0)
         if device.coupling.scope == "link" or not state.epsilon or state.tones or np.all(gain == 1.0):
             return done
-        from .fit import Hold, response_to
+        from .waves.fit import Hold, response_to
 
         real = response_to(device.chain, Hold(state.epsilon, state.lam * gain, state.omega), state.phasor).phasor[0]
         away = float(np.abs(real - state.phasor).max())

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, RungError, Setting, solve
-from chainsim.basis import basis_for
-from chainsim.joint import newton_joint
-from chainsim.joint_branches import joint_branches
-from chainsim.joint_roots import roots_of
-from chainsim.scaling import Stages
+from chainsim.steady.basis import basis_for
+from chainsim.steady.joint import newton_joint
+from chainsim.steady.joint_branches import joint_branches
+from chainsim.steady.joint_roots import roots_of
+from chainsim.steady.scaling import Stages
 
 DELTA = 5.3006e-3
 BELOW = {"epsilon": 4e-3, "lam": 1e-2, "omega": 0.985}

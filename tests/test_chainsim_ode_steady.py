@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainsim import Branch, Chain, Outcome, Setting, solve
-from chainsim.ode import OdeRung, reached_from_rest, steady_from_rest
+from chainsim.motion.ode import OdeRung, reached_from_rest, steady_from_rest
 from chainsim.rung import RungError, Start
 
 CASES = json.loads((Path(__file__).parent / "data" / "steady_states.json").read_text())

@@ -54,13 +54,13 @@ def test_compiled_now_or_read_from_disk(tmp_path):
 
 
 def test_a_changed_helper_is_a_changed_kernel():
-    from chainsim.fast_chain import march_blocks
-    from chainsim.linked_kernels import advance_linked
+    from chainsim.motion.linked_kernels import advance_linked
+    from chainsim.sweeping.fast_chain import march_blocks
 
     assert {name for name, _, _ in sources_stamp(march_blocks.py_func)} == {
         "fast_balance.py", "fast_chain.py", "fast_floquet.py",
     }  # fmt: skip
     for name, changed, size in sources_stamp(advance_linked.py_func):
-        stat = (Path(__file__).parent.parent / "chainsim" / name).stat()
+        stat = (Path(__file__).parent.parent / "chainsim" / "motion" / name).stat()
         assert (changed, size) == (stat.st_mtime_ns, stat.st_size)
     assert march_blocks._cache._cache_file._source_stamp == sources_stamp(march_blocks.py_func)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, Setting, load_device, solve
-from chainsim.envelope import follow
-from chainsim.terms import (
+from chainsim.slow.envelope import follow
+from chainsim.terms.terms import (
     AmplifierDynamics,
     BoucWen,
     Creep,
@@ -24,8 +24,8 @@ from chainsim.terms import (
     bending_modes,
     modulated,
 )
-from chainsim.terms_ode import integrate_terms
-from chainsim.terms_tones import two_tones
+from chainsim.terms.terms_ode import integrate_terms
+from chainsim.terms.terms_tones import two_tones
 
 DELTA = 5.3006e-3
 ONE = Chain(1, 0.1, -1.0)
@@ -265,8 +265,10 @@ def test_preload_and_bias_shift_the_rest():
 
 
 def test_no_compiler_is_imported_before_an_integration():
-    names = "continuation, envelope, envelope_rung, locking, spectrum, terms, terms_tones"
-    code = f"import sys; from chainsim import {names}; print({{'numba', 'scipy', 'matplotlib'}} & set(sys.modules))"
+    names = "slow.envelope, slow.envelope_rung, stability.continuation, stability.locking, stability.spectrum"
+    names += ", terms.terms, terms.terms_tones"
+    loads = "; ".join(f"import chainsim.{name}" for name in names.split(", "))
+    code = f"import sys; {loads}; print({{'numba', 'scipy', 'matplotlib'}} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
 
 

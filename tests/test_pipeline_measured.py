@@ -20,7 +20,7 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
 from planner import plan_scene
-from planner.batch_march import Parts, march
+from planner.spreading.batch_march import Parts, march
 
 Floats = NDArray[np.float64]
 

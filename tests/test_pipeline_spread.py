@@ -13,9 +13,9 @@ from chainsim import ProfileError, load_device
 from dotwave.render import render_job
 from dotwave.scene_report import SceneReport
 from dotwave.verify import verify
-from planner.batch_march import march
-from planner.links import drive_for, links_for
-from planner.spread import Spread, drawn_in
+from planner.levels.links import drive_for, links_for
+from planner.spreading.batch_march import march
+from planner.spreading.spread import Spread, drawn_in
 
 DEVICE = load_device("linked-6x6")
 PROFILE = [1, 1, 0.1, 0.1, 1, 1]

@@ -22,9 +22,9 @@ from chainsim import Device, load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import ChainState, FramePlan, Ramp, plan_scene
 from planner.cache import PlanCache, cache_path
-from planner.deflection import Deflection
+from planner.levels.deflection import Deflection
+from planner.levels.vibration import Vibration
 from planner.strategy import Strategy
-from planner.vibration import Vibration
 
 ROOT = Path(__file__).resolve().parent.parent
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")

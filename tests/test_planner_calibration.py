@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, solve
-from planner.batch_march import Parts, march
-from planner.calibration import FEWEST_POINTS, ChainFit, Sweep, SweepError, fit_chain
+from planner.spreading.batch_march import Parts, march
+from planner.spreading.calibration import FEWEST_POINTS, ChainFit, Sweep, SweepError, fit_chain
 
 Floats = NDArray[np.float64]
 

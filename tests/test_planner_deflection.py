@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Closure, Device, Outcome, Span, load_device
 from planner import Ramp
-from planner.deflection import Deflection
+from planner.levels.deflection import Deflection
 from planner.strategy import strategy_for
 
 PAPER = load_device("paper-6x6")

@@ -14,19 +14,19 @@ from chainsim import Device, Outcome, load_device
 from chainsim.calibrated import ActuatorSpread
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import FramePlan, Plan, plan_scene
-from planner import expected as expected_module
-from planner.band import choose_band
 from planner.chains import Chains
-from planner.expected import WANTED, Expectation
 from planner.held import Held
-from planner.links import drive_for, links_for
-from planner.outlook import FrameSpread
-from planner.robust_aim import aim_for
-from planner.robust_search import Held as Settings
-from planner.robust_search import Search, Trial
-from planner.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
-from planner.vibration import Vibration
-from planner.walking import walking_state
+from planner.levels.band import choose_band
+from planner.levels.links import drive_for, links_for
+from planner.levels.vibration import Vibration
+from planner.spreading import expected as expected_module
+from planner.spreading.expected import WANTED, Expectation
+from planner.spreading.outlook import FrameSpread
+from planner.spreading.robust_aim import aim_for
+from planner.spreading.robust_search import Held as Settings
+from planner.spreading.robust_search import Search, Trial
+from planner.spreading.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
+from planner.waves.walking import walking_state
 from planner.wish import ChainWish
 
 Floats = NDArray[np.float64]
@@ -209,7 +209,7 @@ def test_links_with_bits_are_links_that_can_be_set(bits: int) -> None:
 
 
 def test_the_steps_of_a_converter_are_part_of_the_error() -> None:
-    amplifier = LINKED.amplifier.model_copy(update={"bits": 16})
+    amplifier = LINKED.amplifier.model_copy(update={"bits": 10})
     clean, coarse = (of(planned(spread(LINKED, 1e-3, amplifier=one), DOTS)[0]) for one in (LINKED.amplifier, amplifier))
     assert 1.02 * clean.expected < coarse.expected < clean.expected + 0.2
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from planner import jets
+from planner.ways import jets
 
 LENGTH = 10
 X = np.linspace(-1.0, 1.0, 9)

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
-from planner.nearest import nearest_geometric
+from planner.levels.nearest import nearest_geometric
 from planner.strategy import strategy_for
-from planner.wave_state import wave_state
+from planner.waves.wave_state import wave_state
 from planner.wish import ChainWish
 
 RING = load_device("paper-6x6-ring")

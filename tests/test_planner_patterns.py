@@ -27,8 +27,8 @@ from encoders import (
     walking_bars,
 )  # fmt: skip
 from planner import DwellTooShort, FramePlan, Plan, plan_scene
-from planner.fit import Hold, response_to
-from planner.wave_forms import wave_for
+from planner.waves.fit import Hold, response_to
+from planner.waves.wave_forms import wave_for
 
 NAMES = ["paper-6x6", "paper-6x6-common", "linked-6x6", "independent-6x6", "ultrasonic-6x6", "paper-6x6-ring"]
 GRID = GridShape(6, 6)
@@ -86,11 +86,13 @@ class Trial:
     pattern: TargetPattern
 
     def plans(self) -> list[FramePlan]:
-        """Shown for two seconds, or where that is too short, long enough for the slowest way there is."""
-        try:
-            return self._shown(2.0 * self.shorter)
-        except DwellTooShort:
-            return self._shown((70.0 if self.device.name.endswith("ring") else 25.0) * self.shorter)
+        """Shown for two seconds, or where that is too short, longer: some rings take minutes."""
+        for dwell_s in (2.0, 25.0, 100.0):
+            try:
+                return self._shown(dwell_s * self.shorter)
+            except DwellTooShort:
+                continue
+        return self._shown(400.0 * self.shorter)
 
     def _shown(self, dwell_s: float) -> list[FramePlan]:
         # Bars that walk slowly take long to be told apart.
@@ -135,7 +137,8 @@ def check(trial: Trial, folder: Path) -> str:
         assert shown.note.startswith(trial.device.name)
         assert all(np.all(np.isfinite(state.phasor)) and np.isfinite(state.error) for state in shown.states)
         return "unreachable"
-    path = folder / "shown.wav"
+    # Not a WAV: rows of six equal dots magnify the rounding to float32 to 0.1 % of full scale.
+    path = folder / "shown.npz"
     write_waveform(Plan(trial.device, plans, {}), path)
     (felt,) = verify(path).frames
     limit = TONES if trial.pattern.walking is not None else EXACT

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, Setting, solve
-from planner import refine as refine_module
-from planner.links import drive_for, links_for
-from planner.refine import Refined, refine
+from planner.levels import refine as refine_module
+from planner.levels.links import drive_for, links_for
+from planner.levels.refine import Refined, refine
 
 CHAIN = Chain(n=6, delta=5.3006e-3, beta=-1.0)
 OMEGA = 1.35

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device, solve
-from planner.batch_march import Parts, march
-from planner.deflection import Deflection
 from planner.errors import PlanError
-from planner.links import drive_for, links_for
+from planner.levels.deflection import Deflection
+from planner.levels.links import drive_for, links_for
+from planner.levels.vibration import Vibration
 from planner.plan import ChainState, Tone
-from planner.ring_march import march_ring
-from planner.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
-from planner.tone_march import march_tones
-from planner.two_tones import MAIN, two_tones
-from planner.vibration import Vibration
+from planner.spreading.batch_march import Parts, march
+from planner.spreading.ring_march import march_ring
+from planner.spreading.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
+from planner.spreading.tone_march import march_tones
+from planner.waves.two_tones import MAIN, two_tones
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

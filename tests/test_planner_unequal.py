@@ -13,11 +13,11 @@ from chainsim import Device, Outcome, Setting, balance_near, load_device, solve
 from chainsim.calibrated import Actuator
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
-from planner import vibration as vibration_module
 from planner.cache import PlanCache
 from planner.chains import Chains
+from planner.levels import vibration as vibration_module
+from planner.levels.refine import refine
 from planner.plan import ChainState
-from planner.refine import refine
 from planner.unequal import UnequalChains
 
 Floats = NDArray[np.float64]

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setting, Span, load_device, solve
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
 from planner import ChainState
-from planner.fit import Freedom, Hold, Wanted, fit, response_to
 from planner.margins import converter_error
-from planner.two_tones import MAIN, ORDERS, two_tones
-from planner.wave_forms import lag_and_ratio, wave_for, wave_on
-from planner.wave_state import wave_state
-from planner.wave_ways import enter_wave, leave_wave
+from planner.waves.fit import Freedom, Hold, Wanted, fit, response_to
+from planner.waves.two_tones import MAIN, ORDERS, two_tones
+from planner.waves.wave_forms import lag_and_ratio, wave_for, wave_on
+from planner.waves.wave_state import wave_state
+from planner.ways.wave_ways import enter_wave, leave_wave
 from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, COMMON, SINGLE = (
@@ -115,12 +115,13 @@ def test_a_coarse_converter_is_said_to_be_one() -> None:
     assert state.lacking.endswith("it lacks bits")
 
 
-def test_the_converter_error_is_that_of_white_noise() -> None:
-    """One actuator: the variance of a resonator under white noise of density S is pi S / (2 delta), one-sided."""
+def test_the_converter_error_is_that_of_shaped_noise() -> None:
+    """One actuator: the variance of a resonator under a one-sided density S of noise there is pi S / (2 delta)."""
     amplifier = Amplifier(volts=100.0, slew_v_per_s=3e5, rate_hz=8000, bits=12)
     device = SINGLE.model_copy(update={"amplifier": amplifier})
     step = amplifier.volt_step * device.epsilon_per_volt
-    density = step**2 / 12 / (math.pi * amplifier.rate_hz / device.tau_per_s)
+    rate = amplifier.rate_hz / device.tau_per_s
+    density = step**2 / 12 / (math.pi * rate) * (2 * math.sin(1 / rate / 2)) ** 4
     expected = math.sqrt(density * math.pi / (2 * device.delta))
     found = converter_error(device, Hold(0.01 + 0j, np.zeros(0), 1.0))
     assert found == pytest.approx(expected, rel=0.05)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Setting, balance_near, solve
-from chainsim.continuation import continue_branch
-from chainsim.envelope import follow
-from chainsim.locking import locking
-from chainsim.spectrum import delta_from_critical_lam
+from chainsim.slow.envelope import follow
+from chainsim.stability.continuation import continue_branch
+from chainsim.stability.locking import locking
+from chainsim.stability.spectrum import delta_from_critical_lam
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
 

@@ -1,0 +1,3 @@
+"""What lasts: eigenvalues, multipliers, folds, locking."""
+
+__all__: list[str] = []

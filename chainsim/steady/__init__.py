@@ -1,0 +1,3 @@
+"""What stays: equilibria and periodic answers by closed forms and harmonic balance."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""Many settings of one chain at once, compiled."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""Patterns of amplitude or deflection: dots and levels."""
+
+__all__: list[str] = []

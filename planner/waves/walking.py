@@ -1,0 +1,166 @@
+"""What one chain holds for bars that walk."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device, Outcome
+
+from ..levels.links import detuning_gain
+from ..margins import lacking_of, slew_of
+from ..plan import ChainState, Margins, Tone
+from ..wish import ChainWish
+from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
+
+__all__ = ["TONES_GOOD", "walking_rate_hz", "walking_state"]
+
+Floats = NDArray[np.float64]
+
+# What is asked of tones, relative to each: their combinations are only modelled in the slow flow.
+TONES_GOOD = 5e-3
+SIDE = [k not in (MAIN, MAIN + 1) for k in range(len(ORDERS))]
+# Halvings in the search for the largest amplitude that has an answer; relative deviation of a width or rate that is the
+# same, and how often and how well the width is fitted to a rate.
+HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
+# Bars narrower than this have tones at lags of nearly 0 and 180 degrees, beyond any lam.
+NARROWEST = 1.01
+
+
+def walking_state(device: Device, wish: ChainWish) -> ChainState:
+    """The settings for a wave of two tones of half the wished amplitude; the nearest where they cannot be made."""
+    level, lam = float(wish.amplitude.max()), None if math.isnan(wish.lam) else wish.lam
+    if np.ptp(wish.amplitude[wish.weight > 0]) > 0:
+        return _nothing(device, wish, "bars walk with one amplitude along a chain; it lacks a drive for every actuator")
+    found, share = _found(device, level, wish, lam), 1.0
+    if found is None:
+        share, found = _lower(device, level, wish, lam)
+    if found is None:
+        return _nothing(device, wish, "no two tones stand under one lam; it lacks range of lam")
+    state = _state(device, wish, found)
+    lacking = _lacking(device, wish, found, share) or lacking_of(state.margins)
+    return replace(state, outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking)
+
+
+def walking_rate_hz(device: Device, state: ChainState) -> float:
+    """Bars that pass an actuator in a second in the state of a walk."""
+    other = next(tone for tone in state.tones if not tone.side)
+    return (other.omega - state.omega) * device.f0_hz
+
+
+def _found(device: Device, level: float, wish: ChainWish, lam: float | None) -> TwoTones | None:
+    """Two tones under a lam that can be set."""
+    chain, coupling = device.chain, device.coupling
+    amplitude = level * device.full_scale / 2
+    spacing = wish.rate_hz / device.f0_hz
+    width = wish.width
+    if math.isnan(width):
+        width = max(NARROWEST, math.pi / 2 / math.atan(spacing / device.delta))
+    if device.chain_length == 1:
+        if math.isnan(spacing):
+            return two_tones(chain, amplitude=amplitude, width=width)
+        return apart(chain, amplitude=amplitude, width=width, spacing=spacing)
+    if math.isnan(wish.width):
+        width = _fitted(device, amplitude, width, spacing)
+    if lam is None and coupling.lam.min < coupling.lam.max:
+        free = two_tones(chain, amplitude=amplitude, width=width)
+        if free is None:
+            return None
+        lam = float(np.clip(free.lam, coupling.lam.min, coupling.lam.max))
+        if coupling.lam_step:
+            lam = coupling.lam.min + coupling.lam_step * round((lam - coupling.lam.min) / coupling.lam_step)
+        if lam == free.lam:
+            return free
+    return two_tones(chain, amplitude=amplitude, width=width, lam=coupling.lam.min if lam is None else lam)
+
+
+def _fitted(device: Device, amplitude: float, width: float, spacing: float) -> float:
+    """The width at which two tones are so far apart, over f0; a linear chain's where none is found."""
+    first, asked = width, spacing
+    for _ in range(FITS):
+        found = two_tones(device.chain, amplitude=amplitude, width=width)
+        if found is None:
+            return first
+        if abs(found.spacing / spacing - 1) < FITTED:
+            break
+        asked *= spacing / found.spacing
+        width = max(NARROWEST, math.pi / 2 / math.atan(asked / device.delta))
+    return width
+
+
+def _lower(device: Device, level: float, wish: ChainWish, lam: float | None) -> tuple[float, TwoTones | None]:
+    good, bad, kept = 0.0, 1.0, None
+    for _ in range(HALVINGS):
+        middle = (good + bad) / 2
+        found = _found(device, level * middle, wish, lam)
+        if found is None:
+            bad = middle
+        else:
+            good, kept = middle, found
+    return good, kept
+
+
+def _lacking(device: Device, wish: ChainWish, found: TwoTones, share: float) -> str:
+    if share < 1.0:
+        part = f"{100 * share:.0f} % of this amplitude"
+        return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta)"
+    if abs(found.width / wish.width - 1) > SAME:
+        return f"its lam makes bars {found.width:.3g} actuators wide; it lacks range of lam"
+    rate_hz = found.spacing * device.f0_hz
+    if abs(rate_hz / wish.rate_hz - 1) > SAME:
+        if math.isnan(wish.width):
+            return f"its lam makes bars walk at {rate_hz:.3g} Hz; it lacks range of lam"
+        return f"bars of this width walk at {rate_hz:.3g} Hz; it lacks a drive for every actuator"
+    if found.omega[MAIN] < device.omega.min or found.omega[MAIN + 1] > device.omega.max:
+        return f"it takes frequencies outside {device.omega.min:g}..{device.omega.max:g}; it lacks range of omega"
+    return ""
+
+
+def _state(device: Device, wish: ChainWish, found: TwoTones) -> ChainState:
+    n = device.chain_length
+    lags = np.outer(found.lag, wish.place + np.arange(n))
+    phasors = found.phasor[:, None] * np.exp(-1j * lags)
+    drives = found.epsilon * np.exp(-1j * found.lag * wish.place)
+    tones = [
+        Tone(float(omega), complex(drive), phasor, side)
+        for omega, drive, phasor, side in zip(found.omega, drives, phasors, SIDE, strict=True)
+    ]
+    first, *others = sorted(tones, key=lambda tone: tone.side)
+    lam = np.full(n - 1, found.lam if n > 1 else 0.0)
+    reached = (np.abs(first.phasor) + np.abs(others[0].phasor)) / device.full_scale
+    together = float(np.abs(drives).sum())
+    gain = detuning_gain(device.chain, np.abs(first.phasor)[None, :], lam[None, :], first.omega)
+    # The tones with all side tones in line, and the third harmonic that goes with them.
+    highest = float(np.abs(found.phasor).sum())
+    highest += abs(device.beta) * highest**3 / 32
+    return ChainState(
+        target=wish.amplitude,
+        epsilon=first.epsilon,
+        lam=lam,
+        bias=np.zeros(n),
+        omega=first.omega,
+        phasor=first.phasor,
+        mean=np.zeros(n),
+        error=float(np.abs((reached - wish.amplitude)[wish.weight > 0]).max()),
+        margins=Margins(
+            volts=together / device.epsilon_max,
+            well=highest / device.escape_amplitude,
+            noise_gain=float(gain[0]),
+            slew=slew_of(device, together, float(found.omega.max())),
+        ),
+        outcome=Outcome.OK,
+        tones=tuple(others),
+    )
+
+
+def _nothing(device: Device, wish: ChainWish, lacking: str) -> ChainState:
+    n = device.chain_length
+    silence = np.zeros(n, dtype=np.complex128)
+    return ChainState(
+        target=wish.amplitude, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
+        phasor=silence, mean=np.zeros(n), error=float(wish.amplitude.max()), margins=Margins(0.0, 0.0),
+        outcome=Outcome.UNREACHABLE, lacking=lacking,
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""What one chain holds for a wave, how far that is from every limit, and what the device lacks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Device, Outcome
+
+from ..levels.links import detuning_gain
+from ..levels.nearest import nearest_geometric
+from ..margins import converter_error, lacking_of, slew_of, well_of
+from ..plan import ChainState, Margins
+from ..wish import ChainWish
+from .fit import Fitted
+from .wave_fit import GOOD, WaveFit
+
+__all__ = ["wave_state"]
+
+Floats = NDArray[np.float64]
+
+# Rounding lam by half a step turns each lag by about half the step over lam; errors up to so many times what that
+# makes along the chain are laid to it.
+ROUNDING = 2.0
+# Amplitudes this far (of full scale) from every geometric row are out of reach by their shape, whatever else is.
+UNEVEN = 0.1
+
+
+def wave_state(device: Device, wish: ChainWish) -> ChainState:
+    """The settings for a wave, or for amplitudes that one lam can make.
+
+    Where the wish cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
+    nearest motion of all.
+    """
+    task = WaveFit(device, wish)
+    found, share = task.best(1.0), 1.0
+    near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
+    if not task.stands(found) and not near and not task.jagged:
+        lower = task.lower()
+        share, found = (1.0, found) if lower is None else lower
+    return _Told(task, found, share).state()
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What was found for `share` of a wish, to be told."""
+
+    task: WaveFit
+    found: Fitted
+    share: float
+
+    def state(self) -> ChainState:
+        """The state."""
+        task, device, hold = self.task, self.task.device, self.found.hold
+        n, known = device.chain_length, bool(np.isfinite(self.found.error))
+        phasor = self.found.phasor if known else np.zeros(n, dtype=np.complex128)
+        noise = converter_error(device, hold) if known else 0.0
+        error = task.wanted(1.0).error(phasor) + noise
+        margins = self._margins() if known else Margins(0.0, 0.0)
+        lacking = self._lacking(error, noise) or lacking_of(margins)
+        return ChainState(
+            target=task.wish.amplitude,
+            epsilon=hold.epsilon,
+            lam=hold.lam,
+            bias=np.zeros(n),
+            omega=hold.omega,
+            phasor=phasor,
+            mean=np.zeros(n),
+            error=error / device.full_scale,
+            margins=margins,
+            outcome=Outcome.UNREACHABLE if lacking else Outcome.OK,
+            phase=task.wish.phase if np.any(task.phased) else None,
+            lacking=lacking,
+        )
+
+    def _margins(self) -> Margins:
+        device, hold, found = self.task.device, self.found.hold, self.found
+        gain = detuning_gain(device.chain, np.abs(found.phasor)[None, :], hold.lam[None, :], hold.omega)
+        return Margins(
+            volts=abs(hold.epsilon) / device.epsilon_max,
+            well=well_of(device, found.response),
+            noise_gain=float(gain[0]),
+            slew=slew_of(device, abs(hold.epsilon), hold.omega),
+            multiplier=float(np.nan_to_num(np.abs(found.response.multipliers)).max()),
+        )
+
+    def _lacking(self, error: float, noise: float) -> str:
+        """One clause on what keeps the device from the wish, "" when nothing."""
+        task, found, scale = self.task, self.found, self.task.scale
+        if task.stands(found) and self.share == 1.0:
+            small = error <= 2 * GOOD * scale
+            return "" if small else f"the converter's steps leave {100 * noise / scale:.1g} % error; it lacks bits"
+        if self._uneven():
+            return self._no_freedom()
+        if self.share < 1.0:
+            part = f"{100 * self.share:.0f} % of this amplitude"
+            return f"no more than {part} was found to stand on one branch; it lacks linearity (a smaller beta)"
+        if task.backwards:
+            return "waves travel away from a drive, lagging by 0 to 180 degrees; it lacks a drive for every actuator"
+        if found.outcome is not Outcome.OK:
+            return "nothing near it is stable; it lacks damping, or linearity (a smaller beta)"
+        return self._out_of_range() or self._no_freedom()
+
+    def _uneven(self) -> bool:
+        """Whether neighbours are to differ as one lam and one drive never let them."""
+        device, target = self.task.device, self.task.wish.amplitude
+        if device.coupling.scope == "link":
+            return False
+        near = nearest_geometric(device, target, 1.0)
+        return bool(np.abs(near.first * near.ratio ** np.arange(len(target)) - target).max() > UNEVEN)
+
+    def _out_of_range(self) -> str:
+        hold, lam, omega = self.found.hold, self.task.device.coupling.lam, self.task.device.omega
+        # Zero is a link that passes nothing on, which may be wanted; nothing lies below it.
+        low = lam.min > 0 and bool(np.any(hold.lam <= lam.min))
+        if self.task.freedom.lam and (low or np.any(hold.lam >= lam.max)):
+            return f"it takes a lam {'below' if low else 'above'} {lam.min:.3g}..{lam.max:.3g}; it lacks range of lam"
+        if not omega.min < hold.omega < omega.max:
+            return f"it takes a frequency outside {omega.min:g}..{omega.max:g}; it lacks range of omega"
+        return ""
+
+    def _no_freedom(self) -> str:
+        device = self.task.device
+        rounding = device.chain_length * device.coupling.lam_step / max(float(self.found.hold.lam.max()), 1e-9) / 2
+        if self.found.error < ROUNDING * rounding * self.task.scale:
+            return f"lam can only be set in steps of {device.coupling.lam_step:.2g}; it lacks bits of lam"
+        shape = "ring" if device.coupling.closure is Closure.RING else "chain"
+        if device.coupling.scope == "link":
+            return f"no links of this {shape} hold it at one frequency; it lacks a drive for every actuator"
+        return (
+            f"one lam and one drive per {shape} fix the ratio between neighbours; "
+            "it lacks a bias per actuator or a lam per link of an open chain"
+        )

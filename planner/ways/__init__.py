@@ -1,0 +1,3 @@
+"""From one pattern to the next."""
+
+__all__: list[str] = []

@@ -1,0 +1,158 @@
+"""The slow way: a drive that rises smoothly and is then waited for, in the full equations.
+
+For motions nothing quicker is known for: rings, waves of several tones, and waves whose lam may not move.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Device, GridIntegrator
+
+from ..plan import Ramp, Tone, ToneRamp
+
+__all__ = ["SAMPLES", "STAYS", "Sounding", "felt_envelope", "slow_fall", "slow_rise"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Lengths of the rise tried, in e-folds of a single actuator; how long it is waited after each, in e-folds of the
+# motion's slowest disturbance, or where that is not known, of a single actuator: every stage passes on, magnified,
+# what has not yet died in those before it.
+RISES, WAIT, LONGER_WAIT = (1.0, 3.0), 30.0, 30.0
+# The motion must stay right for the last part of the wait.
+STAYS = 0.2
+SAMPLES, NODES = 64, 33
+# A fall takes the drive away in so many periods.
+FALL_PERIODS = 8
+LEFT = 1e-3
+
+
+@dataclass(frozen=True)
+class Sounding:
+    """A standing motion of one chain: its tones (the first is the main one), its links, shape (n-1,), and the largest
+    modulus of its Floquet multipliers, 0 where that is not known.
+    """
+
+    tones: tuple[Tone, ...]
+    lam: Floats
+    multiplier: float = 0.0
+
+    def wait(self, device: Device) -> float:
+        """How long to wait at most, in tau; a disturbance shrinks by the multiplier in every period."""
+        if not 0 < self.multiplier < 1:
+            return LONGER_WAIT * 2 / device.delta
+        return -WAIT * 2 * math.pi / self.tones[0].omega / math.log(self.multiplier)
+
+
+def slow_rise(device: Device, held: Sounding, tolerance: float) -> Ramp:
+    """The shortest of the slow ways from rest; `tolerance` relative to the largest amplitude.
+
+    The drive of the first tone is the ramp's own, the others are its `tones`.
+    """
+    efold = 2 / device.delta
+    found = [(rise, _settled(device, held, rise * efold, tolerance)) for rise in RISES]
+    known = [(settled, rise) for rise, settled in found if settled is not None]
+    if not known:
+        lacking = "the motion does not come to stand from rest; it lacks damping, or a lam that can move on the way"
+        return _rise_ramp(device, held, RISES[-1] * efold, RISES[-1] * efold, lacking)
+    settled, rise = min(known)
+    return _rise_ramp(device, held, rise * efold, settled, "")
+
+
+def _step(x: Floats) -> Floats:
+    return np.asarray(x**3 * (10 - 15 * x + 6 * x**2))
+
+
+def _rise_ramp(device: Device, held: Sounding, rise: float, end: float, lacking: str) -> Ramp:
+    x = np.linspace(0.0, 1.0, NODES)
+    # After the rise the drive stands still while the motion comes to stand.
+    tau = np.append(x * rise, max(end, rise * (1 + 1e-9)))
+    step = np.append(_step(x), 1.0)
+    slope = np.append(30 * (x * (1 - x)) ** 2, 0.0) / rise * device.tau_per_s
+    first, *others = [_tone_ramp(tone, step, slope) for tone in held.tones]
+    return Ramp(tau / device.tau_per_s, first.epsilon, first.epsilon_slope, lacking=lacking, tones=tuple(others))
+
+
+def _tone_ramp(tone: Tone, size: Floats, slope: Floats) -> ToneRamp:
+    return ToneRamp(tone.omega, np.asarray(tone.epsilon * size), np.asarray(tone.epsilon * slope))
+
+
+def _settled(device: Device, held: Sounding, rise: float, tolerance: float) -> float | None:
+    """When, in tau, the motion stands for good; None where it does not."""
+    omega = held.tones[0].omega
+    dtau = 2 * math.pi / omega / SAMPLES
+    periods = math.ceil((rise + held.wait(device)) / (dtau * SAMPLES))
+    tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
+    size = _step(np.minimum(tau / rise, 1.0))
+    force = np.zeros((len(tau), 1, device.chain_length))
+    for tone in held.tones:
+        # Straight lines between samples pass a carrier with sinc^2.
+        half = tone.omega * dtau / 2
+        force[:, 0, 0] += size * (tone.epsilon * np.exp(1j * tone.omega * tau)).real * (half / math.sin(half)) ** 2
+    lam = np.concatenate([held.lam[:1], held.lam])[None, :]
+    ring = device.coupling.closure is Closure.RING
+    chain = device.chain
+    grid = GridIntegrator(
+        shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
+        ring=ring, dtau=dtau,
+    )  # fmt: skip
+    z = grid.advance(force, lam)[:, 0]
+    felt = felt_envelope(z, omega, tau)
+    wanted = np.zeros_like(z)
+    for tone in held.tones:
+        wanted += (np.exp(1j * tone.omega * tau)[:, None] * tone.phasor).real
+    scale = sum(float(np.abs(tone.phasor).max()) for tone in held.tones)
+    away = np.abs(np.subtract(felt, felt_envelope(wanted, omega, tau))).max(axis=1)
+    bad = np.flatnonzero(~(away <= tolerance * scale))
+    last = int(bad[-1]) + 1 if len(bad) else 0
+    return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
+
+
+def felt_envelope(z: Floats, omega: float, tau: Floats) -> Complexes:
+    """First harmonic in each period; complex128, shape (periods, n)."""
+    turned = z * np.exp(-1j * omega * tau)[:, None]
+    return np.asarray(2 * turned.reshape(-1, SAMPLES, z.shape[1]).mean(axis=1))
+
+
+def slow_fall(device: Device, held: Sounding, opens: bool) -> Ramp:
+    """The drive is taken away, the links are opened where they may be, and the motion dies away by itself.
+
+    It ends when small motions, which the largest amplitude bounds, have fallen to 1/1000.
+    """
+    length = 2 * math.pi * FALL_PERIODS
+    x = np.linspace(0.0, 1.0, NODES)
+    lam = held.lam + ((device.coupling.lam.min if opens else held.lam) - held.lam) * _step(x)[:, None]
+    end = length + _dying(device, lam[-1])
+    still, slope = 1 - _step(x), -30 * (x * (1 - x)) ** 2 / length * device.tau_per_s
+    still, slope, lam = np.append(still, 0.0), np.append(slope, 0.0), np.vstack([lam, lam[-1:]])
+    t_s = np.append(x * length, end) / device.tau_per_s
+    moves = opens and lam.size > 0
+    return Ramp(
+        t_s=t_s,
+        lam_t_s=t_s if moves else None,
+        lam=lam if moves else None,
+        tones=tuple(_tone_ramp(tone, still, slope) for tone in held.tones),
+    )
+
+
+def _dying(device: Device, lam: Floats) -> float:
+    """Time in tau after which a chain without drive has lost all but 1/1000, whatever its motion was."""
+    n = device.chain_length
+    links = np.concatenate([lam[:1] if device.coupling.closure is Closure.RING else [0.0] * min(n, 1), lam])
+    # Slow flow of small motions: 2 i A' = (lam_m - i delta ...) A_m - lam_m A_{m-1}, in the frame of f0.
+    flow = np.diag(-device.delta / 2 + 0.5j * links).astype(np.complex128)
+    for m in range(n):
+        flow[m, m - 1] -= 0.5j * links[m] if n > 1 else 0.0
+    step = 0.1 / device.delta
+    # Matrix exponential by squaring of a short Taylor step.
+    short = flow * (step / 1024)
+    once = np.linalg.matrix_power(np.eye(n) + short + short @ short / 2 + short @ short @ short / 6, 1024)
+    left, tau = np.eye(n, dtype=np.complex128), 0.0
+    while np.abs(left).sum(axis=1).max() > LEFT and tau < 400 / device.delta:
+        left, tau = once @ left, tau + step
+    return tau
