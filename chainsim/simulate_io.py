@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from .chain import Chain, Closure, CouplingKind, Setting
+from .chain import Chain, Closure, Setting
+from .chain_section import ChainSection
 from .rung import Start
 from .simulate_answer import plain_of, plain_with_terms
 from .simulate_terms import TermsSection
@@ -27,39 +28,8 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class _Grid(_Part):
-    rows: Annotated[int, Field(ge=1, le=MAX_OSCILLATORS)]
-    cols: Annotated[int, Field(ge=1, le=MAX_OSCILLATORS)]
-
-
-class _Chain(_Part):
-    grid: _Grid | None = None
-    n: Annotated[int, Field(ge=1, le=MAX_OSCILLATORS)] | None = None
-    delta: NotNegative | list[NotNegative]
-    beta: Finite | list[Finite]
-    stiffness: Finite | list[Finite] = 1.0
-    closure: Closure = Closure.OPEN
-    kind: CouplingKind = CouplingKind.RESISTOR
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> _Chain:
-        if (self.n is None) == (self.grid is None):
-            raise ValueError("give either n, the length of a chain, or grid: {rows: ..., cols: ...}")
-        if self.size > MAX_OSCILLATORS:
-            raise ValueError(f"expected at most {MAX_OSCILLATORS} oscillators, got {self.size}")
-        self.built()
-        return self
-
-    @property
-    def size(self) -> int:
-        """Number of oscillators."""
-        return self.grid.rows * self.grid.cols if self.grid is not None else self.n or 0
-
-    def built(self) -> Chain:
-        return Chain.of(
-            self.size, delta=self.delta, beta=self.beta, stiffness=self.stiffness, closure=self.closure,
-            rows=self.grid.rows if self.grid is not None else 1, kind=self.kind,
-        )  # fmt: skip
+class _Chain(ChainSection):
+    most: ClassVar[int] = MAX_OSCILLATORS
 
 
 class _Setting(_Part):

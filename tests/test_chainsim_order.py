@@ -238,10 +238,3 @@ def test_multipliers_from_the_frozen_system_are_those_of_the_steps(monkeypatch):
     ours, theirs = (np.sort(np.log(np.abs(each.multipliers)).ravel()) for each in (frozen, steps))
     assert ours == pytest.approx(theirs, abs=0.01)
     assert not np.array_equal(ours, theirs)
-
-
-def test_coefficients_of_the_composition_are_those_of_the_transient_kernel():
-    from chainsim.motion import composition, splitting
-
-    for name in ("FLOWS", "KICKS", "KICK_TIMES"):
-        assert np.array_equal(getattr(composition, name), getattr(splitting, name))

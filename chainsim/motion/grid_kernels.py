@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..inlined import inlined
-from .splitting import FLOWS, KICK_TIMES, KICKS, flow
+from .composition import FLOWS, KICK_TIMES, KICKS
+from .splitting import flow
 
 __all__ = ["WIDTH", "Actuators", "Chains", "Stretch", "advance_chains", "advance_unequal"]
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..inlined import inlined
+from .composition import FLOWS, KICK_TIMES, KICKS
 from .grid_kernels import Actuators, Chains, Stretch
-from .splitting import FLOWS, KICK_TIMES, KICKS, flow
+from .splitting import flow
 
 __all__ = ["Samples", "Wiring", "advance_linked"]
 

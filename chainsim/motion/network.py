@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from .splitting import FLOWS, KICKS, flow
+from .composition import FLOWS, KICKS
+from .splitting import flow
 
 __all__ = ["Network", "advance_network", "flows_of"]
 

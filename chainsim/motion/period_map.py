@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..inlined import inlined
+from .composition import FLOWS, KICKS
 from .network import Network
-from .splitting import FLOWS, KICKS, flow
+from .splitting import flow
 
 __all__ = ["HARMONICS", "map_joint", "shoot_forward"]
 

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..inlined import inlined
+from .composition import FLOWS, KICK_TIMES, KICKS
 
-__all__ = ["FLOWS", "KICKS", "KICK_TIMES", "WIDTH", "System", "advance_block", "flow", "forcing_table"]
+__all__ = ["WIDTH", "System", "advance_block", "flow", "forcing_table"]
 
 Floats = NDArray[np.float64]
 
@@ -39,24 +40,10 @@ _CUBIC, _GROWTH, _STEP, _DECAY, _CLOSING, _DRIVE, _SHARED = (_LANES * row for ro
 # between flows, the pending shear.
 _LINK, _PULL, _CONSTANT, _BY_P, _BY_Q, _PENDING, _ROW = (_LANES * row for row in (2, 3, 4, 5, 9, 13, 14))
 
-_A = (0.0711334264982231177779387300061549964174, 0.241153427956640098736487795326289649618,
-      0.521411761772814789212136078067994229991, -0.333698616227678005726562603400438876027)  # fmt: skip
-_B = (0.183083687472197221961703757166430291072, 0.310782859898574869507522291054262796375,
-      -0.0265646185119588006972121379164987592663, 0.0653961422823734184559721793911134363710)  # fmt: skip
-
-FLOWS = np.array([_A[0], _A[1], _A[2], _A[3], _A[3], _A[2], _A[1], _A[0]])
-"""Lengths of the eight linear flows of one step, in steps."""
-
-KICKS = np.array([_B[0], _B[1], _B[2], _B[3], _B[2], _B[1], _B[0]])
-"""Weights of the seven kicks between them."""
-
-KICK_TIMES = np.cumsum(FLOWS)[:7]
-"""When the kicks happen, in steps from the start of the step."""
-
 # The flows are a2, a3, a4, a4, a3, a2 and, across the end of a step, twice a1.
-_DISTINCT = np.array([_A[1], _A[2], _A[3], 2 * _A[0]])
-_FIRST = _A[0]
-_B0, _B1, _B2, _B3 = _B
+_FIRST = float(FLOWS[0])
+_DISTINCT = np.append(FLOWS[1:4], 2 * _FIRST)
+_B0, _B1, _B2, _B3 = (float(weight) for weight in KICKS[:4])
 
 
 class System(NamedTuple):

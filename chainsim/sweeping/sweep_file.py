@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from ..chain import Chain, Closure, CouplingKind, Setting
+from ..chain import Chain, Setting
+from ..chain_section import ChainSection
 from ..errors import ProfileError
 from ..rung import Start
 from ..yamlfile import read_model
@@ -65,41 +66,6 @@ _Links = Annotated[
 ]
 
 
-Length = Annotated[int, Field(ge=1, le=1_000_000)]
-Damping = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-
-
-class _Grid(_Part):
-    rows: Length
-    cols: Length
-
-
-class _Chain(_Part):
-    grid: _Grid | None = None
-    n: Length | None = None
-    delta: Damping | list[Damping]
-    beta: Finite | list[Finite]
-    stiffness: Finite | list[Finite] = 1.0
-    closure: Closure = Closure.OPEN
-    kind: CouplingKind = CouplingKind.RESISTOR
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> _Chain:
-        if (self.n is None) == (self.grid is None):
-            raise ValueError("give either n, the length of a chain, or grid: {rows: ..., cols: ...}")
-        self.built()
-        return self
-
-    def built(self) -> Chain:
-        rows, size = (1, self.n or 0) if self.grid is None else (self.grid.rows, self.grid.rows * self.grid.cols)
-        if size > 1_000_000:
-            raise ValueError(f"expected at most 1000000 oscillators, got {size}")
-        return Chain.of(
-            size, delta=self.delta, beta=self.beta, stiffness=self.stiffness, closure=self.closure, rows=rows,
-            kind=self.kind,
-        )  # fmt: skip
-
-
 class _Setting(_Part):
     table: str | None = None
     epsilon: _Axis | None = None
@@ -112,7 +78,7 @@ class _Setting(_Part):
 
 
 class _File(_Part):
-    chain: _Chain
+    chain: ChainSection
     setting: _Setting
     rung: Literal["auto", "harmonic_balance"] = "auto"
     tol: Annotated[float, Field(ge=1e-12, le=1)]
