@@ -92,6 +92,8 @@ class _Settling:
     def __init__(self, chain: Chain, setting: Setting) -> None:
         size, n = len(setting), setting.n
         self.way = Run(chain, setting, FINE)
+        # A hardening chain leaves no well: what its slow flow runs off to is no motion of it.
+        self.bound = bool(chain.betas.min() >= 0 and chain.betas.max() > 0)
         self.outcome = np.empty(size, dtype=object)
         self.outcome.fill(Outcome.OUT_OF_BUDGET)
         if self.way.flow.lean is not None:
@@ -115,7 +117,8 @@ class _Settling:
             seen[lanes] = _apart(before, here)
             changes.append(seen)
             gone = ~(way.peak[lanes] <= np.minimum(way.top[lanes], BOUND)).all(axis=1)
-            self.outcome[lanes[gone]] = Outcome.ESCAPED
+            if not self.bound:
+                self.outcome[lanes[gone]] = Outcome.ESCAPED
             # A cubic term as strong as the spring leaves nothing slow: no verdict.
             gone |= way.spent[lanes] | (way.strength(lanes) > STRONGEST)
             lanes, here = lanes[~gone], here[~gone]
