@@ -26,6 +26,8 @@ SAME_ORBIT = 1e-2
 FAINT = 1e-8
 # Of the hilltop, for a mean: a sudden force swings to twice as far and more, and at 0.2955 it throws it over.
 THROWN = 0.25
+# Rungs that list every branch, also of oscillators that act on each other.
+LISTED = ("static", "one_harmonic", "harmonic_balance")
 
 
 def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
@@ -39,7 +41,8 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         escapes or does not lock, integrating where that is not plain; a steady rung by name gives the lower branch.
         ``ramp``, the drive raised slowly from 0: the lower branch; past its fold, where ``auto`` and ``ode`` find
         that a drive raised within 100/delta ends (other rungs: `NO_CONVERGENCE`).
-        ``all``, every branch of one setting, along the batch axis, the lowest first.
+        ``all``, every branch of one setting, along the batch axis, the lowest first. Of a ring or a bidirectional chain
+        `joint_branches` also says whether the list is complete.
 
     Raises
     ------
@@ -57,19 +60,28 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         raise ValueError("setting: expected at least one setting, got none")
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
+    if way is Start.ALL and chain.betas.any() and not chain.feed_forward and rung in ("auto", *LISTED):
+        from .steady.joint_branches import joint_branches
+
+        name = rung if rung != "auto" else _first(setting)
+        return joint_branches(chain, setting, tol=tol, rung=name).response
     if rung != "auto":
         return load_rung(rung).solve(chain, setting, tol=tol, start=way)
     if not chain.betas.any():
         return _linear(chain, setting, tol, way)
     if way is Start.ALL:
-        name = "harmonic_balance" if setting.epsilon.any() else "static"
-        return load_rung(name).solve(chain, setting, tol=tol, start=way)
+        return load_rung(_first(setting)).solve(chain, setting, tol=tol, start=way)
     steady = _cheapest(chain, setting, tol, way)
     if way is Start.REST:
         return _from_rest(chain, setting, tol, steady)
     from .slow.envelope_ramp import from_ramp
 
     return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
+
+
+def _first(setting: Setting) -> str:
+    """The rung that lists every branch."""
+    return "harmonic_balance" if setting.epsilon.any() else "static"
 
 
 def _linear(chain: Chain, setting: Setting, tol: float, start: Start) -> Response:

@@ -118,11 +118,23 @@ def test_auto_from_rest_agrees_with_integration_where_it_did_not_integrate():
     assert (np.abs(whole.phasor - steady.phasor[sure]).max(axis=1) <= 1e-6 * size_of).all()
 
 
+def test_branches_of_a_ring_come_the_lowest_first():
+    ring = Chain(3, 0.02, -1.0, Closure.RING)
+    setting = Setting.of(ring, epsilon=0.02, lam=0.05, omega=0.95)
+    listed = solve(ring, setting, tol=1e-8, start="all")
+    assert len(listed) > 3
+    low = solve(ring, setting, tol=1e-8, start="ramp")
+    np.testing.assert_allclose(listed.phasor[0], low.phasor[0], rtol=1e-6)
+    assert 1 <= listed.stable.sum() < len(listed)
+
+
 def test_refusals_name_the_cure():
     ring = Chain(6, 0.01, -1.0, Closure.RING)
     setting = Setting.of(ring, epsilon=1e-3, lam=0.01, omega=1.0)
-    with pytest.raises(RungError, match="use start rest or ramp"):
-        solve(ring, setting, tol=1e-6, rung="harmonic_balance", start="all")
+    with pytest.raises(RungError, match="expected one setting of a ring or bidirectional chain, got 2"):
+        solve(ring, Setting.of(ring, epsilon=[1e-3, 2e-3], lam=0.01, omega=1.0), tol=1e-6, start="all")
+    with pytest.raises(RungError, match="envelope"):
+        solve(ring, setting, tol=1e-6, rung="envelope", start="all")
     two = Setting.of(CHAIN, epsilon=[1e-3, 2e-3], lam=0, omega=1.0)
     with pytest.raises(RungError, match="one setting, got 2"):
         solve(CHAIN, two, tol=1e-6, rung="one_harmonic", start="all")

@@ -22,7 +22,8 @@ Floats = NDArray[np.float64]
 LONGEST_RAMP_S = 0.35
 CANDIDATES = 41
 NODES_PER_RAMP = 251
-# A rise, whose links stay as they are, needs 2 + 0.74 n beats instead: then its residue is below 2e-6.
+# A rise, whose links stay as they are, needs 2 + 0.74 n beats instead: its residue is then 2e-6 of full scale or less,
+# 2e-4 where six dots are alike.
 RISE_SHARE = 0.87
 # Half of the volts stay free for what a closed form does not know.
 STEADY_SHARE = 0.5
