@@ -47,7 +47,7 @@ def bench(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for bench.json and bench.svg.")] = Path(
         "out/bench"
     ),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings and no slow peers.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
     as_json: Json = False,
 ) -> None:
     """Measure steady states, transients, long chains and maps, and what is installed of their peers, as ratios.
