@@ -71,7 +71,7 @@ def test_a_stopped_wave_rests_at_any_phase_of_the_carrier(lag_deg: float, level:
     assert ramp.duration_s < 3 * EFOLD_S
     orbit, amplitude = orbit_of(PAPER.chain, held, omega)[0], float(np.abs(held.phasor).max())
     for phase in (0.0, 0.9, 2.3):
-        passage = travel(PAPER.chain, omega, way_of(ramp), orbit, 200, phase)
+        passage = travel(PAPER.chain, omega, way_of(ramp), orbit, 200, (phase,))
         assert np.abs(passage.felt).max() <= 1e-3 * amplitude
         assert passage.peak <= 1.1 * CALM * amplitude
 

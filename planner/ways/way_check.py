@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,11 +114,11 @@ class Orbit:
 
 @dataclass(frozen=True)
 class Passage:
-    """How it went.
+    """How it went from P phases of the carrier.
 
     Attributes
     ----------
-    felt : complex128, shape (periods, n), first harmonics in each whole period after the way.
+    felt : complex128, shape (P, periods, n), first harmonics in each whole period after the way.
     peak : largest |z| of all.
     """
 
@@ -125,34 +126,35 @@ class Passage:
     peak: float
 
 
-def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: int, phase: float) -> Passage:
+def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: int, phases: Sequence[float]) -> Passage:
     """Follow a way from rest or from an orbit, then stand for so many periods.
 
     Parameters
     ----------
-    phase : of the carrier when the way begins, and of the orbit, radians.
+    phases : of the carrier when the way begins, and of the orbit, radians; all are followed side by side.
     """
     from chainsim import GridIntegrator
 
-    dtau = 2 * math.pi / omega / SAMPLES_PER_PERIOD
+    dtau, count = 2 * math.pi / omega / SAMPLES_PER_PERIOD, len(phases)
     steps = math.ceil(float(way.tau[-1]) / dtau)
     tau = dtau * np.arange(steps + periods * SAMPLES_PER_PERIOD, dtype=np.float64)
-    carrier = np.exp(1j * (omega * tau + phase))
+    carrier = np.exp(1j * np.add.outer(omega * tau, phases))
     pass_by, tilt = _hold(omega, dtau)
     value, slope = way.drive(tau)
-    force = np.zeros((len(tau), 1, chain.n))
-    force[:, 0, 0] = ((value / pass_by + 1j * slope * tilt / pass_by**2) * carrier).real
+    force = np.zeros((len(tau), count, chain.n))
+    force[:, :, 0] = ((value / pass_by + 1j * slope * tilt / pass_by**2)[:, None] * carrier).real
     lam = np.zeros_like(force)
-    lam[:, 0, 1:] = way.links(tau)
+    lam[:, :, 1:] = way.links(tau)[:, None]
     grid = GridIntegrator(
-        shape=(1, chain.n), chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
+        shape=(count, chain.n), chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
     )
     if start is not None:
-        before = start.prelude(chain, dtau, phase) / _hold(start.omega, dtau)[0]
-        grid.advance(before[:, None, :], np.concatenate([[0.0], start.lam])[None, :])
-    z = grid.advance(force, lam)[:, 0]
-    after = (z[steps:] * carrier[steps:, None].conj()).reshape(periods, SAMPLES_PER_PERIOD, chain.n)
-    return Passage(2 * after.mean(axis=1), float(np.abs(z).max()))
+        before = np.stack([start.prelude(chain, dtau, phase) for phase in phases], axis=1)
+        links = np.broadcast_to(np.concatenate([[0.0], start.lam]), (count, chain.n))
+        grid.advance(before / _hold(start.omega, dtau)[0], links)
+    z = grid.advance(force, lam)
+    after = (z[steps:] * carrier[steps:, :, None].conj()).reshape(periods, SAMPLES_PER_PERIOD, count, chain.n)
+    return Passage(2 * after.mean(axis=1).transpose(1, 0, 2), float(np.abs(z).max()))
 
 
 def _hold(omega: float, dtau: float) -> tuple[float, float]:

@@ -138,7 +138,7 @@ def _died(chain: Chain, held: Standing, orbit: Orbit, limits: WayLimits, tau_per
     omega, lacking = orbit.omega, ""
     way = _let_go(held, omega, limits, 0.0)
     periods = min(MOST_PERIODS, math.ceil((chain.n + 1) * EFOLDS * omega / (math.pi * max(chain.delta, 1e-9))))
-    left = np.abs(travel(chain, omega, way, orbit, periods, 0.0).felt)
+    left = np.abs(travel(chain, omega, way, orbit, periods, (0.0,)).felt[0])
     loud = np.flatnonzero((left > STANDS * np.abs(held.phasor)).any(axis=1))
     over = int(loud[-1]) + 1 if len(loud) else 0
     still = way.then(_still(np.array([0.0, 2 * math.pi / omega * (over + 1)]), way.lam[-1]))

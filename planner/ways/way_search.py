@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 # Relative deviation of an actuator at and after the end of a way that still counts as standing; a way may use half of
 # it, the rest is for what plays it.
 STANDS = 1e-3
+# Phases of the carrier at which that is seen to, with the worst among them or beside one.
+PHASES = (0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
 # The full equations are made to arrive this well, so that what later stages magnify stays far below `STANDS`.
 ARRIVES, CORRECTIONS = 1e-6, 8
 # Longest time after a way that is looked at.
@@ -172,16 +174,17 @@ class Search:
         for _ in range(CORRECTIONS):
             way = self.way(task, unknowns)
             # What is not slow turns twice with the carrier: half of it is left at the worst phase.
-            ends = [self._travel(way, 1, phase).felt[0] for phase in (0.0, math.pi / 2)]
-            missed = (np.mean(ends, axis=0) - self.held.phasor) / task.amplitude
+            ends = self._travel(way, 1, (0.0, math.pi / 2)).felt[:, 0]
+            missed = (ends.mean(axis=0) - self.held.phasor) / task.amplitude
             if not np.abs(missed).max() > ARRIVES:
                 break
             unknowns = unknowns + slopes.least_step(np.concatenate([missed.real, missed.imag]))
         way = self.way(task, unknowns)
-        passage = self._travel(way, self._time_after, math.pi / 2)
-        away = np.abs(passage.felt - self.held.phasor).max(axis=0)
+        passage = self._travel(way, self._time_after, PHASES)
+        away = np.abs(passage.felt - self.held.phasor).max(axis=(0, 1))
         standing = self.orbit.harmonics[0] if self.orbit is not None and self.held.resting else self.held.phasor
-        allowed = STANDS / 2 * np.abs(standing)
+        # The settled motion may be off by half of it, the samples by a little.
+        allowed = 0.4 * STANDS * np.abs(standing)
         self.lacking = self.limits.exceeded(way, self.omega, self.tau_per_s)
         if not passage.peak <= self.limits.hilltop(self.chain):
             self.lacking = f"it passes through {passage.peak:.3g}, too near the edge of the well; it lacks time"
@@ -189,8 +192,8 @@ class Search:
             self.lacking = "what is found on the slow flow does not stand in the full equations; it lacks time"
         return None if self.lacking else way
 
-    def _travel(self, way: Way, periods: int, phase: float) -> Passage:
-        return travel(self.chain, self.omega, way, self.orbit, periods, phase)
+    def _travel(self, way: Way, periods: int, phases: Sequence[float]) -> Passage:
+        return travel(self.chain, self.omega, way, self.orbit, periods, phases)
 
     @property
     def _time_after(self) -> int:
