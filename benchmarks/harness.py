@@ -33,7 +33,7 @@ def measure(quick: bool) -> dict[str, Any]:
         "load_before": os.getloadavg()[0],
         "steady": steady(10_000 if quick else 100_000, 15),
         "one_alone": one_alone(),
-        "transients": transients(1024 if quick else 4096, 5),
+        "transients": transients(1024 if quick else 10_000, 5),
         "lengths": lengths(100_000 if quick else 1_000_000),
         "map": map_of_settings(100 if quick else 1000, 3),
     }

@@ -161,20 +161,22 @@ def boost_odeint(wanted: Floats, goal: float) -> dict[str, Any]:
 
 
 def pyharm(wanted: Floats, goal: float) -> dict[str, Any]:
-    """pyHarm-os in its own environment: harmonics 1 and 3 along a branch in omega, processor time a point."""
+    """pyHarm-os in its own environment: the harmonics of our kernel along a branch in omega, processor time a point."""
     if not PYHARM.exists():
         here = PYHARM.parent.parent
         raise Missing(f"pyHarm-os has no environment: python3 -m venv {here} && {here}/bin/pip install pyHarm-os")
     base = {"epsilon": 4e-4, "lam": 6.131e-3}
     asked = base | {
-        "n": CHAIN.n, "delta": CHAIN.delta, "omega": [0.985, 1.015], "harmonics": [1, 3], "points": 60, "step": 4e-4,
+        "n": CHAIN.n, "delta": CHAIN.delta, "omega": [0.985, 1.015], "harmonics": [1, 3, 5], "points": 60, "step": 4e-4,
         "solver": "scipyroot",
     }  # fmt: skip
-    done = subprocess.run(
-        [str(PYHARM), "-W", "ignore", str(HERE / "pyharm_points.py")],
-        input=json.dumps(asked), text=True, capture_output=True, check=False,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
-    )  # fmt: skip
+    # It leaves a folder where it runs.
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [str(PYHARM), "-W", "ignore", str(HERE / "pyharm_points.py")],
+            input=json.dumps(asked), text=True, capture_output=True, check=False, cwd=folder,
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
+        )  # fmt: skip
     if done.returncode:
         raise Missing(f"pyHarm-os failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
     told = json.loads(done.stdout.splitlines()[-1])
