@@ -202,7 +202,7 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
         spread=watch.tally.spread,
         tolerance=how.study.limit,
         outcomes=watch.outcomes,
-        notes=tuple(watch.notes),
+        notes=(*watch.paces(), *watch.notes),
         seconds=time.perf_counter() - began,
     )
 
@@ -215,6 +215,7 @@ class _Watch:
     how: Rendering
     outcomes: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    walks: dict[str, int] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
 
     def __iter__(self) -> Iterator[FramePlan]:
@@ -224,7 +225,22 @@ class _Watch:
             self.tally.add(frame)
             if frame.outcome is not Outcome.OK:
                 self._failed(number, frame)
+            elif any(state.tones for state in frame.states):
+                self.walks.setdefault(self._pace(frame), number)
             yield frame
+
+    def paces(self) -> Iterator[str]:
+        """A line for every pace, with the first frame that has it."""
+        for pace, number in self.walks.items():
+            yield f"Frame {number}: {pace} bars a second walk past an actuator."
+
+    def _pace(self, frame: FramePlan) -> str:
+        """The slowest and the quickest walk of a frame, bars a second."""
+        from planner import walking_rate_hz
+
+        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.tones)
+        ends = [f"{rates[0]:.3g}", f"{rates[-1]:.3g}"]
+        return " to ".join(dict.fromkeys(ends))
 
     def _failed(self, number: int, frame: FramePlan) -> None:
         if not self.notes:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     )
     from .spreading.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
     from .surroundings import HigherMode, Surroundings, assumed
+    from .waves.walking import walking_rate_hz
 
 __all__ = [
     "DEFAULT_CONTRAST_DB",
@@ -86,10 +87,12 @@ __all__ = [
     "seconds_words",
     "spread_of",
     "trade_off",
+    "walking_rate_hz",
     "wish_of",
 ]
 
 _LATE = {
+    "walking_rate_hz": "waves.walking",
     "TradePoint": "spreading.outlook",
     "FrameSpread": "spreading.outlook",
     "pareto_of": "price.pareto",

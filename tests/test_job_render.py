@@ -172,3 +172,12 @@ def test_choices_are_checked() -> None:
         picture_options(output="loud")
     with pytest.raises(EncodeError, match="zoom"):
         picture_options(zoom=99)
+
+
+def test_the_pace_of_bars_is_told(tmp_path: Path) -> None:
+    job = tmp_path / "walk.yaml"
+    walk = "  - texture: {walking_bars: {width: 2, rate_hz: 3, level: 0.3}, dwell_s: 3}\n"
+    job.write_text("schema: dotwave/job/1\ndevice: independent-6x6\nsequence:\n" + 2 * walk, encoding="utf-8")
+    report = render_job(job, None)
+    assert report.ok
+    assert [note for note in report.notes if "walk" in note] == ["Frame 1: 3 bars a second walk past an actuator."]
