@@ -6,7 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from chainsim import Chain, Closure, CouplingKind, Outcome, RungError, Setting, solve, steady_from_rest
+from chainsim import (
+    Chain,
+    Closure,
+    CouplingKind,
+    Outcome,
+    RungError,
+    Setting,
+    Start,
+    load_rung,
+    solve,
+    steady_from_rest,
+)
 
 DELTAS, BETAS = [0.10, 0.14, 0.08, 0.12, 0.11, 0.09], [-1.0, -0.5, 0.0, 0.8, -1.5, -1.0]
 OWN = [1, 1.02, 0.97, 1.1, 1, 0.9]
@@ -259,5 +270,6 @@ def test_descriptions_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match=r"setting\.lam_y: only a grid"):
         Setting.of(Chain(2, 0.1, -1.0), epsilon=0.1, lam=0.1, lam_y=0.1, omega=1.0)
     two_way = Chain(3, 0.1, -1.0, "bidirectional")
-    with pytest.raises(RungError, match="use start rest or ramp"):
-        solve(two_way, Setting.of(two_way, epsilon=0.1, lam=0.1, omega=1.0), tol=1e-6, start="all")
+    setting = Setting.of(two_way, epsilon=0.1, lam=0.1, omega=1.0)
+    with pytest.raises(RungError, match="the branches of a bidirectional chain are found together: use joint_branches"):
+        load_rung("harmonic_balance").solve(two_way, setting, tol=1e-6, start=Start.ALL)

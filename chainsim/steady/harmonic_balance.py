@@ -60,7 +60,7 @@ def branch_refusal(chain: Chain, setting: Setting, start: Start) -> str:
     if start is not Start.ALL:
         return ""
     if not chain.feed_forward:
-        return f"the branches of a {chain.closure} chain cannot be counted one by one; use start rest or ramp"
+        return f"the branches of a {chain.closure} chain are found together: use joint_branches, or solve"
     return f"start all takes one setting, got {len(setting)}" if len(setting) != 1 else ""
 
 
