@@ -14,8 +14,6 @@ Complexes = NDArray[np.complex128]
 
 # The share of the cubic's slope at which Newton's correction of a closed-form root would leave its branch (a fold).
 FLAT = 1e-6
-# A last correction of |A|^2 is smaller than this, relative, or there is none: it is rounding that is taken out.
-NEARBY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -135,16 +133,7 @@ def _amplitude2(linear: Complexes, cubic: Floats, push: Floats, near: tuple[Comp
             high = 2 * c / (np.sqrt(np.maximum(inside, 0.0)) - b)
             there = (inside >= 0) & (b < 0) & (c > 0)
             s = np.where(there & _closer(linear, cubic, push**2 / modulus2, high, s, near), high, s)
-    return _settled(linear, cubic, push, push**2 / modulus2 / s)
-
-
-def _settled(linear: Complexes, cubic: Floats, push: Floats, square: Floats) -> Floats:
-    """|A|^2 after one step of Newton's method on the balance itself, where the detuning is a difference once only."""
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        detuned = linear.real + cubic * square
-        modulus2 = detuned**2 + linear.imag**2
-        step = (square * modulus2 - push**2) / (modulus2 + 2 * cubic * square * detuned)
-        return np.asarray(np.where(np.abs(step) <= NEARBY * square, square - step, square))
+    return np.asarray(push**2 / modulus2 / s)
 
 
 def _polished(s: Floats, p: Floats, q: Floats) -> Floats:
