@@ -83,8 +83,13 @@ def test_one_oscillator_has_the_roots_of_its_cubic(
         parts, np.full((1, 1), push + 0j), np.zeros((1, 1)), 1.0, None if near is None else np.array([[near]])
     )
     found = abs(motion.phasor[0, 0]) ** 2
-    balance = found * ((k + 0.75 * sign * beta * found) ** 2 + delta**2) / push**2
-    assert balance == pytest.approx(1, abs=1e-8)
+
+    def balance(square: float) -> float:
+        return square * ((k + 0.75 * sign * beta * square) ** 2 + delta**2) / push**2
+
+    # Far up a branch the balance turns on a small difference: what a billionth of the answer changes is no error.
+    rounding = abs(balance(found * (1 + 1e-9)) - balance(found * (1 - 1e-9)))
+    assert balance(found) == pytest.approx(1, abs=1e-8 + rounding)
     # Close to a fold the roots of the polynomial and of the balance part at the square root of the rounding.
     apart = np.diff(expected).min() / expected[-1] if len(expected) == 3 else 1.0
     if apart > 1e-3:
