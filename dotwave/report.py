@@ -6,13 +6,14 @@ drawn with boxes and nothing said by colour.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .plan_report import PlanReport, plain
 
 __all__ = [
     "AMPLITUDE_ERROR_LIMIT",
@@ -25,7 +26,6 @@ __all__ = [
     "contrast_between",
     "decibels",
     "margin_lines",
-    "plain",
 ]
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Spreading(Protocol):
 
 
 @dataclass(frozen=True)
-class TextReport:
+class TextReport(PlanReport):
     """What was rendered and what the planner predicts for it.
 
     Attributes
@@ -94,19 +94,6 @@ class TextReport:
     slew: float = 0.0
     multiplier: float = 0.0
     spread: Spreading | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Every frame can be made as asked."""
-        return set(self.outcomes) <= {"ok"}
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report in plain JSON types; a number that is not finite becomes null."""
-        return {"ok": self.ok} | {name: plain(value) for name, value in vars(self).items()}
-
-    def as_text(self) -> str:
-        """The report as lines of plain text."""
-        return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
         yield f"Rendered {_count(self.frames, 'frame')} on {_count(self.pages, 'page')} for {self.device}."
@@ -284,25 +271,6 @@ class VerifyReport:
 
 
 _TOTALS = ("ok", "wrong_dots", "contrast_db", "amplitude_error", "ramp_s")
-
-
-def plain(value: object) -> Any:
-    """`value` in plain JSON types: arrays as rounded lists, numbers that are not finite as null."""
-    if isinstance(value, np.ndarray):
-        return [plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(f"{value:.9g}") if math.isfinite(value) else None
-    if isinstance(value, np.integer):
-        return int(value)
-    if isinstance(value, FrameCheck):
-        return value.as_dict()
-    if hasattr(value, "as_dict"):
-        return plain(value.as_dict())
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    return value
 
 
 def margin_lines(slew: float, multiplier: float) -> Iterator[str]:

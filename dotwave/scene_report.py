@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from .report import Spreading, margin_lines, plain
+from .plan_report import PlanReport
+from .report import Spreading, margin_lines
 
 __all__ = ["SceneReport"]
 
 
 @dataclass(frozen=True)
-class SceneReport:
+class SceneReport(PlanReport):
     """What was rendered and what the planner predicts for it.
 
     Attributes
@@ -41,19 +41,6 @@ class SceneReport:
     slew: float = 0.0
     multiplier: float = 0.0
     spread: Spreading | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Every frame can be made as asked."""
-        return set(self.outcomes) <= {"ok"}
-
-    def as_dict(self) -> dict[str, Any]:
-        """The report in plain JSON types; a number that is not finite becomes null."""
-        return {"ok": self.ok} | {name: plain(value) for name, value in vars(self).items()}
-
-    def as_text(self) -> str:
-        """The report as lines of plain text."""
-        return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
         yield f"Rendered {self.frames} frame{'' if self.frames == 1 else 's'} for {self.device}."

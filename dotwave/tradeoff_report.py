@@ -14,7 +14,7 @@ from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
 
 from .asked import FrameAsked, picture_name
 from .errors import AppError
-from .report import plain
+from .plan_report import plain
 from .source import text_source
 
 if TYPE_CHECKING:

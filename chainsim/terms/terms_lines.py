@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .terms import Tone
 
-__all__ = ["Lines", "Window", "strongest_beside"]
+__all__ = ["Lines", "Window"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -89,18 +89,3 @@ class Window:
         found = reader @ tip
         turned: Complexes = (found[1::2] + 1j * found[2::2]) * np.exp(-1j * self.omega * begin)[:, None]
         return found[0], turned
-
-
-def strongest_beside(samples: Complexes, step: float) -> float:
-    """Angular frequency of the strongest line of `samples` (K,), taken every `step`, beside their mean.
-
-    A Hann window and a parabola through the logarithms of the three highest bins: good to about 1e-3 of a bin.
-    """
-    count = len(samples)
-    window = np.hanning(count + 2)[1:-1]
-    power = np.abs(np.fft.fft(window * (samples - (window @ samples) / window.sum()), 4 * count)) + 1e-300
-    top = int(power.argmax())
-    left, mid, right = (float(np.log(power[(top + k) % len(power)])) for k in (-1, 0, 1))
-    bend = left - 2 * mid + right
-    cycles = ((top + (0.5 * (left - right) / bend if bend else 0.0)) / len(power) + 0.5) % 1.0 - 0.5
-    return 2 * np.pi * cycles / step

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..chain import Chain, Setting
 from ..response import Outcome, Stats
 from ..rung import RungError, Start
+from ..slow.envelope_settle import strongest_line
 from .terms import Terms, Tone
-from .terms_lines import Lines, strongest_beside
+from .terms_lines import Lines
 from .terms_ode import Walk
 
 __all__ = ["Beat", "Drift", "Steady", "steady_with_terms"]
@@ -287,7 +288,7 @@ def _beat_of(samples: Complexes, step: float) -> Beat:
     size = np.abs(samples)
     depth = np.ptp(size, axis=0) / np.maximum(size.max(axis=0), 1e-300)
     window = np.hanning(len(samples) + 2)[1:-1]
-    beat = strongest_beside(samples[:, int(depth.argmax())], step)
+    beat = strongest_line(samples[:, int(depth.argmax())], step)
     return Beat(beat, depth, window @ samples / window.sum())
 
 
