@@ -21,8 +21,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from chainsim import Device, Setting, load_device
-from chainsim.terms.terms import Tone
-from chainsim.terms.terms_tones import two_tones
+from chainsim.effects.effects import Tone
+from chainsim.effects.tones import two_tones
 from encoders import (
     Frame,
     GridShape,

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from problem import CHAIN, PERIODS, median_error, settings
 
 from chainsim import Chain, Setting, solve
-from chainsim.motion.splitting import WIDTH, advance_block, forcing_table
-from chainsim.steady.scaled import in_threads, scaled
-from chainsim.sweeping.sweeps import OUTCOMES, sweep
+from chainsim.batch.sweep import OUTCOMES, sweep
+from chainsim.time_domain.scaled import in_threads, scaled
+from chainsim.time_domain.splitting import WIDTH, advance_block, forcing_table
 
 __all__ = ["ALONE", "lengths", "map_of_settings", "one_alone", "states_after", "steady", "timed", "transients"]
 

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome, load_device
 from encoders import Frame, GridShape, Scene, levels
 from planner import FramePlan, Spread, plan_scene, seconds_words, spread_of
-from planner.strategy import strategy_for
+from planner.families import strategy_for
 
 KEPT = Path(__file__).resolve().parent / "results" / "planning.json"
 SEED, CONTRAST_DB, SPREAD = 0, 20.0, Spread(f0=0.01)

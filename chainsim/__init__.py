@@ -5,24 +5,20 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .calibrated import Actuator, ActuatorSpread
-from .chain import Chain, Closure, CouplingKind, Setting, Spread
-from .device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .errors import ChainError, ProfileError
-from .response import Branch, Outcome, Response, Stats
+from .model.calibrated import Actuator, ActuatorSpread
+from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
+from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
+from .model.response import Branch, Outcome, Response, Stats
 from .rung import RUNGS, Rung, RungError, Start, load_rung
 from .yamlfile import parse_model, read_model
 
 if TYPE_CHECKING:
-    from .ladder import solve
-    from .motion.as_built import AsBuilt
-    from .motion.integrate import Escape, GridError, GridIntegrator
-    from .motion.ode import Reached, reached_from_rest, steady_from_ramp, steady_from_rest
-    from .simulate_io import Simulation, parse_simulation, read_simulation, simulate
-    from .slow.envelope import follow
-    from .slow.envelope_decide import Decision, decide
-    from .stability.continuation import continue_branch
-    from .stability.spectrum import (
+    from .averaging.decide import Decision, decide
+    from .averaging.envelope import follow
+    from .batch.sweep import SweepResult, sweep, unit_of
+    from .continuation.continuation import continue_branch
+    from .continuation.spectrum import (
         critical_lam,
         delta_from_critical_lam,
         gain_per_stage,
@@ -30,16 +26,20 @@ if TYPE_CHECKING:
         rest_eigenvalues,
         spectrum_curve,
     )
-    from .steady.harmonic_balance import balance_near
-    from .steady.joint_branches import Branches, joint_branches
-    from .steady.sensitivity import Gradient, gradient
-    from .sweeping.sweep_file import SettingSweep, read_sweep
-    from .sweeping.sweeps import SweepResult, sweep, unit_of
-    from .terms.terms import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone, bending_modes, modulated
-    from .terms.terms_ode import integrate_terms
-    from .terms.terms_rungs import solve_with_terms
-    from .terms.terms_steady import Steady, steady_with_terms
-    from .terms.terms_tones import two_tones
+    from .effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone, bending_modes, modulated
+    from .effects.ode import integrate_terms
+    from .effects.rungs import solve_with_terms
+    from .effects.steady import Steady, steady_with_terms
+    from .effects.tones import two_tones
+    from .files.simulation import Simulation, parse_simulation, read_simulation, simulate
+    from .files.sweep import SettingSweep, read_sweep
+    from .harmonic_balance.harmonic_balance import balance_near
+    from .harmonic_balance.joint_branches import Branches, joint_branches
+    from .harmonic_balance.sensitivity import Gradient, gradient
+    from .reach.ladder import solve
+    from .time_domain.as_built import AsBuilt
+    from .time_domain.integrate import Escape, GridError, GridIntegrator
+    from .time_domain.ode import Reached, reached_from_rest, steady_from_ramp, steady_from_rest
 
 __all__ = [
     "RUNGS",
@@ -119,53 +119,53 @@ __all__ = [
 ]
 
 _LATE = {
-    "steady_from_ramp": "motion.ode",
-    "decide": "slow.envelope_decide",
-    "Decision": "slow.envelope_decide",
-    "modulated": "terms.terms",
-    "bending_modes": "terms.terms",
-    "Play": "terms.terms",
-    "Mode": "terms.terms",
-    "Creep": "terms.terms",
-    "BoucWen": "terms.terms",
-    "AmplifierDynamics": "terms.terms",
-    "steady_with_terms": "terms.terms_steady",
-    "Steady": "terms.terms_steady",
-    "solve_with_terms": "terms.terms_rungs",
-    "joint_branches": "steady.joint_branches",
-    "Branches": "steady.joint_branches",
-    "AsBuilt": "motion.as_built",
-    "Tone": "terms.terms",
-    "follow": "slow.envelope",
-    "two_tones": "terms.terms_tones",
-    "integrate_terms": "terms.terms_ode",
-    "Terms": "terms.terms",
-    "peak_gain": "stability.spectrum",
-    "gain_per_stage": "stability.spectrum",
-    "rest_eigenvalues": "stability.spectrum",
-    "spectrum_curve": "stability.spectrum",
-    "delta_from_critical_lam": "stability.spectrum",
-    "critical_lam": "stability.spectrum",
-    "continue_branch": "stability.continuation",
-    "SettingSweep": "sweeping.sweep_file",
-    "read_sweep": "sweeping.sweep_file",
-    "SweepResult": "sweeping.sweeps",
-    "sweep": "sweeping.sweeps",
-    "unit_of": "sweeping.sweeps",
-    "Escape": "motion.integrate",
-    "Gradient": "steady.sensitivity",
-    "GridError": "motion.integrate",
-    "GridIntegrator": "motion.integrate",
-    "Reached": "motion.ode",
-    "Simulation": "simulate_io",
-    "balance_near": "steady.harmonic_balance",
-    "gradient": "steady.sensitivity",
-    "parse_simulation": "simulate_io",
-    "reached_from_rest": "motion.ode",
-    "read_simulation": "simulate_io",
-    "simulate": "simulate_io",
-    "solve": "ladder",
-    "steady_from_rest": "motion.ode",
+    "steady_from_ramp": "time_domain.ode",
+    "decide": "averaging.decide",
+    "Decision": "averaging.decide",
+    "modulated": "effects.effects",
+    "bending_modes": "effects.effects",
+    "Play": "effects.effects",
+    "Mode": "effects.effects",
+    "Creep": "effects.effects",
+    "BoucWen": "effects.effects",
+    "AmplifierDynamics": "effects.effects",
+    "steady_with_terms": "effects.steady",
+    "Steady": "effects.steady",
+    "solve_with_terms": "effects.rungs",
+    "joint_branches": "harmonic_balance.joint_branches",
+    "Branches": "harmonic_balance.joint_branches",
+    "AsBuilt": "time_domain.as_built",
+    "Tone": "effects.effects",
+    "follow": "averaging.envelope",
+    "two_tones": "effects.tones",
+    "integrate_terms": "effects.ode",
+    "Terms": "effects.effects",
+    "peak_gain": "continuation.spectrum",
+    "gain_per_stage": "continuation.spectrum",
+    "rest_eigenvalues": "continuation.spectrum",
+    "spectrum_curve": "continuation.spectrum",
+    "delta_from_critical_lam": "continuation.spectrum",
+    "critical_lam": "continuation.spectrum",
+    "continue_branch": "continuation.continuation",
+    "SettingSweep": "files.sweep",
+    "read_sweep": "files.sweep",
+    "SweepResult": "batch.sweep",
+    "sweep": "batch.sweep",
+    "unit_of": "batch.sweep",
+    "Escape": "time_domain.integrate",
+    "Gradient": "harmonic_balance.sensitivity",
+    "GridError": "time_domain.integrate",
+    "GridIntegrator": "time_domain.integrate",
+    "Reached": "time_domain.ode",
+    "Simulation": "files.simulation",
+    "balance_near": "harmonic_balance.harmonic_balance",
+    "gradient": "harmonic_balance.sensitivity",
+    "parse_simulation": "files.simulation",
+    "reached_from_rest": "time_domain.ode",
+    "read_simulation": "files.simulation",
+    "simulate": "files.simulation",
+    "solve": "reach.ladder",
+    "steady_from_rest": "time_domain.ode",
 }
 
 

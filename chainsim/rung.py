@@ -9,19 +9,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from .chain import Chain, Setting
 from .errors import ChainError
-from .response import Response
+from .model.chain import Chain, Setting
+from .model.response import Response
 
 __all__ = ["MAX_PERIODS", "RUNGS", "Rung", "RungError", "Start", "load_rung"]
 
 RUNGS = {
-    "static": ("chainsim.steady.static", "StaticRung"),
-    "linear": ("chainsim.steady.linear", "LinearRung"),
-    "one_harmonic": ("chainsim.steady.one_harmonic", "OneHarmonicRung"),
-    "harmonic_balance": ("chainsim.steady.harmonic_balance", "HarmonicBalanceRung"),
-    "envelope": ("chainsim.slow.envelope_rung", "EnvelopeRung"),
-    "ode": ("chainsim.motion.ode", "OdeRung"),
+    "static": ("chainsim.harmonic_balance.static", "StaticRung"),
+    "linear": ("chainsim.harmonic_balance.linear", "LinearRung"),
+    "one_harmonic": ("chainsim.harmonic_balance.one_harmonic", "OneHarmonicRung"),
+    "harmonic_balance": ("chainsim.harmonic_balance.harmonic_balance", "HarmonicBalanceRung"),
+    "envelope": ("chainsim.averaging.rung", "EnvelopeRung"),
+    "ode": ("chainsim.time_domain.ode", "OdeRung"),
 }
 
 

@@ -10,14 +10,14 @@ from .plan import ChainState, FramePlan, Margins, Plan, Ramp, Tone, ToneRamp
 from .scene_plan import DEFAULT_CONTRAST_DB, plan_scene
 
 if TYPE_CHECKING:
-    from .price.climbing import climb
-    from .price.pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
-    from .price.questions import Question, TradeoffError, questions_of, seconds_words
-    from .price.requirement import Requirement, RequirementError, Term, require
-    from .price.tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
-    from .spreading.calibration import ChainFit, Sweep, SweepError, fit_chain
-    from .spreading.outlook import FrameSpread, TradePoint
-    from .spreading.robust import (
+    from .analysis.climbing import climb
+    from .analysis.pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
+    from .analysis.questions import Question, TradeoffError, questions_of, seconds_words
+    from .analysis.requirement import Requirement, RequirementError, Term, require
+    from .analysis.tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
+    from .identification.calibration import ChainFit, Sweep, SweepError, fit_chain
+    from .outlook import FrameSpread, TradePoint
+    from .robustness.robust import (
         Accuracy,
         Held,
         RobustError,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         hold,
         robust_plan,
     )
-    from .spreading.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
+    from .robustness.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
     from .surroundings import HigherMode, Surroundings, assumed
     from .waves.walking import walking_rate_hz
 
@@ -93,48 +93,48 @@ __all__ = [
 
 _LATE = {
     "walking_rate_hz": "waves.walking",
-    "TradePoint": "spreading.outlook",
-    "FrameSpread": "spreading.outlook",
-    "pareto_of": "price.pareto",
-    "front_of": "price.pareto",
-    "ParetoPoint": "price.pareto",
-    "ParetoFront": "price.pareto",
-    "ParetoError": "price.pareto",
-    "trade_off": "price.tradeoff",
-    "TradeoffRow": "price.tradeoff",
-    "Tradeoff": "price.tradeoff",
-    "Choice": "price.tradeoff",
-    "climb": "price.climbing",
-    "seconds_words": "price.questions",
-    "questions_of": "price.questions",
-    "TradeoffError": "price.questions",
-    "Question": "price.questions",
+    "TradePoint": "outlook",
+    "FrameSpread": "outlook",
+    "pareto_of": "analysis.pareto",
+    "front_of": "analysis.pareto",
+    "ParetoPoint": "analysis.pareto",
+    "ParetoFront": "analysis.pareto",
+    "ParetoError": "analysis.pareto",
+    "trade_off": "analysis.tradeoff",
+    "TradeoffRow": "analysis.tradeoff",
+    "Tradeoff": "analysis.tradeoff",
+    "Choice": "analysis.tradeoff",
+    "climb": "analysis.climbing",
+    "seconds_words": "analysis.questions",
+    "questions_of": "analysis.questions",
+    "TradeoffError": "analysis.questions",
+    "Question": "analysis.questions",
     "assumed": "surroundings",
     "Surroundings": "surroundings",
     "HigherMode": "surroundings",
-    "require": "price.requirement",
-    "Term": "price.requirement",
-    "RequirementError": "price.requirement",
-    "Requirement": "price.requirement",
-    "Accuracy": "spreading.robust",
-    "ChainFit": "spreading.calibration",
-    "Held": "spreading.robust",
-    "RobustError": "spreading.robust",
-    "RobustPlan": "spreading.robust",
-    "Spread": "spreading.spread",
-    "SpreadError": "spreading.spread",
-    "SpreadReport": "spreading.spread",
-    "Sweep": "spreading.calibration",
-    "SweepError": "spreading.calibration",
-    "TradeRow": "spreading.robust",
-    "Trial": "spreading.robust",
-    "Wish": "spreading.spread",
-    "accuracy_needed": "spreading.robust",
-    "fit_chain": "spreading.calibration",
-    "hold": "spreading.robust",
-    "robust_plan": "spreading.robust",
-    "spread_of": "spreading.spread",
-    "wish_of": "spreading.spread",
+    "require": "analysis.requirement",
+    "Term": "analysis.requirement",
+    "RequirementError": "analysis.requirement",
+    "Requirement": "analysis.requirement",
+    "Accuracy": "robustness.robust",
+    "ChainFit": "identification.calibration",
+    "Held": "robustness.robust",
+    "RobustError": "robustness.robust",
+    "RobustPlan": "robustness.robust",
+    "Spread": "robustness.spread",
+    "SpreadError": "robustness.spread",
+    "SpreadReport": "robustness.spread",
+    "Sweep": "identification.calibration",
+    "SweepError": "identification.calibration",
+    "TradeRow": "robustness.robust",
+    "Trial": "robustness.robust",
+    "Wish": "robustness.spread",
+    "accuracy_needed": "robustness.robust",
+    "fit_chain": "identification.calibration",
+    "hold": "robustness.robust",
+    "robust_plan": "robustness.robust",
+    "spread_of": "robustness.spread",
+    "wish_of": "robustness.spread",
 }
 
 

@@ -12,10 +12,11 @@ from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
 from .cache import PlanCache
+from .families import strategy_for
 from .held import Held
 from .plan import ChainState, Margins, Ramp
-from .strategy import Strategy, strategy_for
-from .ways.joining import as_tone, joined, rest_for, turned_ramp, turned_state
+from .strategy import Strategy
+from .transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
 from .wish import ChainWish, Turned, wishes_of
 
 __all__ = ["Chains", "Held"]
@@ -192,7 +193,7 @@ class Chains:
 
         one_tone = not (ends[0].tones or ends[1].tones) and bool(ends[0].epsilon) and bool(ends[1].epsilon)
         if one_tone and self.device.chain_length > 1 and self.device.coupling.closure is Closure.OPEN:
-            from .ways.rest_between import rested
+            from .transitions.rest_between import rested
 
             return rested(self.device, *ends, whole)
         return whole(0.0)
@@ -233,7 +234,7 @@ class Chains:
         return [self._wave_way(pair) for pair in pairs]
 
     def _wave_way(self, pair: _Pair) -> Ramp | None:
-        from .ways.wave_ways import enter_wave, leave_wave
+        from .transitions.waves import enter_wave, leave_wave
 
         enters = pair.before == self.rest.key
         state = self.state(Held(pair.after if enters else pair.before))

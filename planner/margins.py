@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Response
 
-from .levels.links import stages
+from .closed_forms.links import stages
+from .closed_forms.wave_fit import Hold
 from .plan import Margins
-from .waves.fit import Hold
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
 

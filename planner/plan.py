@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import Frame
 
-from .spreading.outlook import FrameSpread
+from .outlook import FrameSpread
 
 __all__ = ["ChainState", "FramePlan", "Margins", "Plan", "Ramp", "Tone", "ToneRamp"]
 

@@ -12,11 +12,11 @@ from encoders import Frame, Scene
 
 from .chains import Chains
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
+from .frame_change import Change, change_to
 from .plan import ChainState, FramePlan, Plan
-from .ways.frame_change import Change, change_to
 
 if TYPE_CHECKING:
-    from .spreading.expected import Expectation
+    from .robustness.expected import Expectation
 
 __all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
 
@@ -65,7 +65,7 @@ class _Frames:
         self._device = device
         self._expected: Expectation | None = None
         if device.spread is not None:
-            from .spreading.expected import Expectation
+            from .robustness.expected import Expectation
 
             self._expected = Expectation(device)
 

@@ -1,18 +1,17 @@
-"""What every way of making patterns on a device supplies, and which one a device gets."""
+"""What every way of making patterns on a device supplies."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device
+from chainsim import Device
 
 from .plan import ChainState, Ramp
 
-__all__ = ["Strategy", "strategy_for"]
+__all__ = ["Strategy"]
 
 Floats = NDArray[np.float64]
 
@@ -49,27 +48,3 @@ class Strategy(ABC):
     def note(self) -> str:
         """One sentence on what the device lacks when states come out unreachable."""
         return ""
-
-
-def strategy_for(
-    device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: Strategy | None = None
-) -> Strategy | None:
-    """The strategy for amplitude patterns that `device` offers most with; None where it has none for any pattern.
-
-    A bias per actuator makes any pattern statically; a lam per link, or no coupling at all, any pattern by
-    vibration; anything else makes only waves.
-
-    Parameters
-    ----------
-    kinds : the chains of a device whose chains have numbers of their own, each as a device. whole : the strategy of
-        such a device when `device` is one of them.
-    """
-    if device.bias == "actuator":
-        from .levels.deflection import Deflection
-
-        return Deflection(device)
-    if device.chain_length == 1 or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN):
-        from .levels.vibration import Vibration
-
-        return Vibration(device, contrast_db, kinds, whole if isinstance(whole, Vibration) else None)
-    return None

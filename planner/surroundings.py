@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from chainsim import Device
 
-from .spreading.spread import Spread, known_spread
+from .robustness.spread import Spread, known_spread
 
 __all__ = ["HigherMode", "Surroundings", "assumed"]
 

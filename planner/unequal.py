@@ -13,9 +13,10 @@ from chainsim import Device, Outcome
 from encoders import TargetPattern
 
 from .chains import MOST_STATES, Chains
+from .families import strategy_for
 from .held import Held
 from .plan import ChainState, Ramp
-from .strategy import Strategy, strategy_for
+from .strategy import Strategy
 from .wish import wishes_of
 
 __all__ = ["UnequalChains"]
@@ -98,7 +99,7 @@ class UnequalChains(Chains):
         gain = device.lam_gain(0)
         if device.coupling.scope == "link" or not state.epsilon or state.tones or np.all(gain == 1.0):
             return done
-        from .waves.fit import Hold, response_to
+        from .closed_forms.wave_fit import Hold, response_to
 
         real = response_to(device.chain, Hold(state.epsilon, state.lam * gain, state.omega), state.phasor).phasor[0]
         away = float(np.abs(real - state.phasor).max())

@@ -100,8 +100,8 @@ def test_a_sudden_bias_escapes_sooner_than_a_slow_one():
 
 
 def test_auto_from_rest_agrees_with_integration_where_it_did_not_integrate():
-    from chainsim.motion.ode import steady_from_rest
-    from chainsim.motion.rest import sure_from_rest
+    from chainsim.reach.rest import sure_from_rest
+    from chainsim.time_domain.ode import steady_from_rest
 
     rng = np.random.default_rng(11)
     chain, size = Chain(4, 6.1e-3, -1.0), 120

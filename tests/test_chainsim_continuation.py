@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, Setting, solve
-from chainsim.slow.envelope_settle import reached
-from chainsim.stability.continuation import ContinuationError, Ending, continue_branch
+from chainsim.averaging.settle import reached
+from chainsim.continuation.continuation import ContinuationError, Ending, continue_branch
 
 
 def folds_in_epsilon(delta, omega):

@@ -9,7 +9,7 @@ import yaml
 from pydantic import ValidationError
 
 from chainsim import Closure, Device, ProfileError, device_names, load_device
-from chainsim.calibrated import Actuator
+from chainsim.model.calibrated import Actuator
 
 
 def profile(**changes):

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, GridIntegrator, Outcome, Setting, Start, solve
+from chainsim.averaging.envelope import EnvelopeError, follow
+from chainsim.averaging.rung import EnvelopeRung
+from chainsim.averaging.settle import reached, strongest_line
+from chainsim.continuation.locking import locking
 from chainsim.rung import RungError
-from chainsim.slow.envelope import EnvelopeError, follow
-from chainsim.slow.envelope_rung import EnvelopeRung
-from chainsim.slow.envelope_settle import reached, strongest_line
-from chainsim.stability.locking import locking
 
 DATA = json.loads((Path(__file__).parent / "data" / "steady_states.json").read_text())
 CASES = DATA["cases"] if isinstance(DATA, dict) else DATA
@@ -277,9 +277,9 @@ CALM = {"lam": 0.02, "omega": 1.01, "epsilon": 1e-3, "delta": 0.05, "beta": -1.0
 @pytest.mark.parametrize("closure", ["open", "ring"])
 def test_hostile_values_end_in_an_outcome(name, value, closure, monkeypatch):
     # A budget small enough for the list; what is not decided in it has to say so.
-    monkeypatch.setattr("chainsim.slow.envelope_settle.LOOKS", 48)
-    monkeypatch.setattr("chainsim.slow.envelope_settle.WINDOWS", 1)
-    monkeypatch.setattr("chainsim.slow.envelope_run.MOST_STEPS", 400)
+    monkeypatch.setattr("chainsim.averaging.settle.LOOKS", 48)
+    monkeypatch.setattr("chainsim.averaging.settle.WINDOWS", 1)
+    monkeypatch.setattr("chainsim.averaging.run.MOST_STEPS", 400)
     what = {**CALM, name: value}
     chain = Chain(what["n"], what["delta"], what["beta"], closure)
     setting = Setting.of(chain, epsilon=what["epsilon"], lam=what["lam"], omega=what["omega"])

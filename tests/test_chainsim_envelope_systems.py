@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from chainsim import Chain, Outcome, RungError, Setting, reached_from_rest, solve, steady_from_rest
-from chainsim.motion.rest import sure_from_rest
+from chainsim.averaging.envelope import EnvelopeError, follow, slow_refusal
+from chainsim.averaging.linear import coupling, exponential, solvent
+from chainsim.averaging.rung import EnvelopeRung
+from chainsim.reach.rest import sure_from_rest
 from chainsim.rung import Start
-from chainsim.slow.envelope import EnvelopeError, follow, slow_refusal
-from chainsim.slow.envelope_linear import coupling, exponential, solvent
-from chainsim.slow.envelope_rung import EnvelopeRung
 
 
 def transient_error(eta, closure, rows, bias):
@@ -169,10 +169,10 @@ HOSTILE = [
 @pytest.mark.parametrize("closure", ["open", "ring", "bidirectional", "grid"])
 @pytest.mark.parametrize(("name", "value"), HOSTILE)
 def test_hostile_values_are_named_and_never_warn(name, value, closure, monkeypatch):
-    monkeypatch.setattr("chainsim.slow.envelope_settle.LOOKS", 24)
-    monkeypatch.setattr("chainsim.slow.envelope_settle.WINDOWS", 1)
-    monkeypatch.setattr("chainsim.slow.envelope_run.MOST_STEPS", 256)
-    monkeypatch.setattr("chainsim.slow.envelope.MOST_STEPS", 2000)
+    monkeypatch.setattr("chainsim.averaging.settle.LOOKS", 24)
+    monkeypatch.setattr("chainsim.averaging.settle.WINDOWS", 1)
+    monkeypatch.setattr("chainsim.averaging.run.MOST_STEPS", 256)
+    monkeypatch.setattr("chainsim.averaging.envelope.MOST_STEPS", 2000)
     what = {"delta": 0.05, "beta": -1.0, "lam": 0.02, "omega": 1.01, "epsilon": 1e-3, "bias": 0.0} | {name: value}
     rows = 2 if closure == "grid" else 1
     chain = Chain.of(

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainsim import Chain, Closure, Outcome, Setting, solve
-from chainsim.sweeping.fast_chain import Found, Given
-from chainsim.sweeping.fast_deep import march_deep, tables_for
-from chainsim.sweeping.fast_floquet import MOST, trace_of
-from chainsim.sweeping.sweeps import OUTCOMES, sweep, unit_of
+from chainsim.batch.chains import Found, Given
+from chainsim.batch.deep import march_deep, tables_for
+from chainsim.batch.multipliers import MOST, trace_of
+from chainsim.batch.sweep import OUTCOMES, sweep, unit_of
 
 CHAIN = Chain(6, 6.1e-3, -1.0)
 OK = OUTCOMES.index(Outcome.OK)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, Setting, solve
-from chainsim.sweeping.sweeps import OUTCOMES, sweep
+from chainsim.batch.sweep import OUTCOMES, sweep
 
 OK = OUTCOMES.index(Outcome.OK)
 

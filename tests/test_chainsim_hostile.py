@@ -145,7 +145,7 @@ def test_a_million_oscillators(system, rung):
 
 @pytest.mark.parametrize("basis_and_rung", ["static", "one_harmonic", "harmonic_balance", "linear"])
 def test_long_chains_are_answered_as_short_ones(basis_and_rung, monkeypatch):
-    from chainsim.steady import long
+    from chainsim.harmonic_balance import long
 
     chain = Chain(40, 0.02, -1.0)
     forces = {"epsilon": 0.0, "preload": 0.1} if basis_and_rung == "static" else {"epsilon": 1e-3}
@@ -248,8 +248,8 @@ def energy(z, v, beta):
 
 @pytest.mark.slow
 def test_energy_stays_bounded_over_a_million_periods():
-    from chainsim.motion.network import Network, advance_network
-    from chainsim.motion.splitting import forcing_table
+    from chainsim.time_domain.network import Network, advance_network
+    from chainsim.time_domain.splitting import forcing_table
 
     one, nothing = np.ones((1, 1)), np.zeros((1, 1))
     network = Network(

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, RungError, Setting, solve
-from chainsim.steady.basis import basis_for
-from chainsim.steady.joint import newton_joint
-from chainsim.steady.joint_branches import joint_branches
-from chainsim.steady.joint_roots import roots_of
-from chainsim.steady.scaling import Stages
+from chainsim.equations.basis import basis_for
+from chainsim.equations.scaling import Stages
+from chainsim.harmonic_balance.joint import newton_joint
+from chainsim.harmonic_balance.joint_branches import joint_branches
+from chainsim.harmonic_balance.joint_roots import roots_of
 
 DELTA = 5.3006e-3
 BELOW = {"epsilon": 4e-3, "lam": 1e-2, "omega": 0.985}

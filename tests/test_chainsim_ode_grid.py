@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
-from chainsim.motion.integrate import Escape, GridError, GridIntegrator
+from chainsim.time_domain.integrate import Escape, GridError, GridIntegrator
 
 
 def grid(shape=(1, 3), chain_length=3, *, delta=0.02, beta=-1.0, ring=False, dtau=0.2):

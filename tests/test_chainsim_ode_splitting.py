@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from chainsim.motion.composition import FLOWS, KICK_TIMES, KICKS
-from chainsim.motion.splitting import System, advance_block, flow, forcing_table
+from chainsim.equations.composition import FLOWS, KICK_TIMES, KICKS
+from chainsim.time_domain.splitting import System, advance_block, flow, forcing_table
 
 
 def transient(

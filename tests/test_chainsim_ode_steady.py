@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainsim import Branch, Chain, Outcome, Setting, solve
-from chainsim.motion.ode import OdeRung, reached_from_rest, steady_from_rest
 from chainsim.rung import RungError, Start
+from chainsim.time_domain.ode import OdeRung, reached_from_rest, steady_from_rest
 
 CASES = json.loads((Path(__file__).parent / "data" / "steady_states.json").read_text())
 PAPER = Chain(n=6, delta=5.3006e-3, beta=-1.0)

@@ -39,9 +39,9 @@ def test_static_error_falls_with_the_square_of_the_drive():
 
 
 def test_harmonic_balance_is_geometric_in_the_harmonics_it_keeps():
-    from chainsim.steady.basis import basis_for
-    from chainsim.steady.march import march
-    from chainsim.steady.scaling import Stages
+    from chainsim.equations.basis import basis_for
+    from chainsim.equations.scaling import Stages
+    from chainsim.harmonic_balance.march import march
 
     chain = Chain(1, 0.1, 1.0)
     stages = Stages.of(chain, Setting.of(chain, epsilon=1.0, lam=0, omega=1.1))
@@ -228,7 +228,7 @@ def test_multipliers_of_coupled_oscillators_far_from_the_drive(closure, delta, o
 
 
 def test_multipliers_from_the_frozen_system_are_those_of_the_steps(monkeypatch):
-    from chainsim.stability import monodromy
+    from chainsim.floquet import monodromy
 
     chain = Chain(4, 0.02, -1.0, "ring")
     setting = Setting.of(chain, epsilon=0.1, lam=0.03, omega=0.01)

@@ -54,8 +54,8 @@ def test_compiled_now_or_read_from_disk(tmp_path):
 
 
 def test_a_changed_helper_is_a_changed_kernel():
-    from chainsim.motion.linked_kernels import advance_linked
-    from chainsim.sweeping.fast_chain import march_blocks
+    from chainsim.batch.chains import march_blocks
+    from chainsim.time_domain.linked_kernels import advance_linked
 
     assert {name for name, _, _ in sources_stamp(march_blocks.py_func)} == {
         "fast_balance.py", "fast_chain.py", "fast_floquet.py",

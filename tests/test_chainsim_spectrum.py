@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chainsim import Chain, Setting
-from chainsim.stability.spectrum import (
+from chainsim.continuation.spectrum import (
     SpectrumError,
     critical_lam,
     delta_from_critical_lam,

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from chainsim import Branch, Chain, Outcome, Setting, reached_from_rest, solve
-from chainsim.motion.ode import steady_from_ramp
-from chainsim.motion.rest import sure_from_rest
+from chainsim.averaging.decide import decide
+from chainsim.reach.envelope_ramp import from_ramp
+from chainsim.reach.rest import sure_from_rest
 from chainsim.rung import Start
-from chainsim.slow.envelope_decide import decide
-from chainsim.slow.envelope_ramp import from_ramp
+from chainsim.time_domain.ode import steady_from_ramp
 
 PAPER = Chain(6, 6.1e-3, -1.0)
 BUDGET = 60_000
@@ -109,7 +109,7 @@ def test_auto_takes_the_envelopes_word_where_it_is_sure(monkeypatch):
     def never(*_args, **_more):
         raise AssertionError("nothing is to be integrated here")
 
-    monkeypatch.setattr("chainsim.motion.ode.reached_from_rest", never)
+    monkeypatch.setattr("chainsim.time_domain.ode.reached_from_rest", never)
     assert (solve(PAPER, settled, tol=1e-6).outcome == Outcome.OK).all()
 
 

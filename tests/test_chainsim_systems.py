@@ -207,7 +207,7 @@ def test_cost_of_a_joint_solve_is_linear_in_its_length(closure):
 
 @pytest.mark.parametrize("closure", ["ring", "bidirectional"])
 def test_band_and_dense_elimination_agree(closure, monkeypatch):
-    from chainsim.steady import joint
+    from chainsim.harmonic_balance import joint
 
     chain = Chain(11, 0.05, -1.0, closure)
     setting = Setting.of(chain, epsilon=[0.01, 0.03], lam=0.1, omega=[1.1, 0.95], bias=0.01)
@@ -234,7 +234,7 @@ def test_a_phase_of_the_drive_turns_every_phasor(closure, n, lam, omega, epsilon
 
 
 def test_when_the_lower_branch_of_a_ring_is_sure_it_is_the_one_integrated():
-    from chainsim.motion.rest import sure_from_rest
+    from chainsim.reach.rest import sure_from_rest
 
     rng = np.random.default_rng(4)
     for closure in ("ring", "bidirectional"):

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, Setting, load_device, solve
-from chainsim.slow.envelope import follow
-from chainsim.terms.terms import (
+from chainsim.averaging.envelope import follow
+from chainsim.effects.effects import (
     AmplifierDynamics,
     BoucWen,
     Creep,
@@ -24,8 +24,8 @@ from chainsim.terms.terms import (
     bending_modes,
     modulated,
 )
-from chainsim.terms.terms_ode import integrate_terms
-from chainsim.terms.terms_tones import two_tones
+from chainsim.effects.ode import integrate_terms
+from chainsim.effects.tones import two_tones
 
 DELTA = 5.3006e-3
 ONE = Chain(1, 0.1, -1.0)

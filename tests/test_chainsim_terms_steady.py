@@ -8,12 +8,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, RungError, Setting, Start, solve
-from chainsim.stability.locking import locking
-from chainsim.terms.terms import AmplifierDynamics, BoucWen, Creep, Play, Terms, Tone, bending_modes
-from chainsim.terms.terms_lines import Lines
-from chainsim.terms.terms_ode import integrate_terms
-from chainsim.terms.terms_rungs import solve_with_terms
-from chainsim.terms.terms_steady import steady_with_terms
+from chainsim.continuation.locking import locking
+from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Play, Terms, Tone, bending_modes
+from chainsim.effects.lines import Lines
+from chainsim.effects.ode import integrate_terms
+from chainsim.effects.rungs import solve_with_terms
+from chainsim.effects.steady import steady_with_terms
 
 DELTA = 5.3006e-3
 SLOW = Creep(per_decade=0.1, first=2.0, last=200.0, each=1)

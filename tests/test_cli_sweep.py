@@ -77,7 +77,7 @@ def test_csv_says_the_same_to_the_last_bit(source, tmp_path):
 @pytest.mark.parametrize("suffix", [".npz", ".csv"])
 def test_the_file_does_not_depend_on_the_chunks(source, tmp_path, suffix, monkeypatch):
     source.write_text(TEXT.replace("harmonic_balance", "auto"))
-    monkeypatch.setattr("chainsim.sweeping.sweeps._UNIT", 48)
+    monkeypatch.setattr("chainsim.batch.sweep._UNIT", 48)
     whole, cut = tmp_path / f"whole{suffix}", tmp_path / f"cut{suffix}"
     run_sweep(source, whole, units=100)
     run_sweep(source, cut, units=1)
@@ -94,7 +94,7 @@ def test_the_file_does_not_depend_on_the_workers(source, tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(source, tmp_path, monkeypatch):
-    monkeypatch.setattr("chainsim.sweeping.sweeps._UNIT", 48)
+    monkeypatch.setattr("chainsim.batch.sweep._UNIT", 48)
     run_sweep(source, tmp_path / "whole.npz", units=1)
     import dotwave.sweep_io as module
 

@@ -113,7 +113,9 @@ def test_equal_pictures_are_told_apart_when_asked(tmp_path: Path) -> None:
 def test_more_copies_than_dots_allow_get_textures(tmp_path: Path) -> None:
     """On four dots there are eight patterns two apart, levels make more."""
     profile = tmp_path / "small.yaml"
-    text = (Path(__file__).resolve().parent.parent / "chainsim/profiles/paper-6x6.yaml").read_text(encoding="utf-8")
+    text = (Path(__file__).resolve().parent.parent / "chainsim/model/profiles/paper-6x6.yaml").read_text(
+        encoding="utf-8"
+    )
     for key in ("rows", "cols", "chain_length"):
         text = text.replace(f"\n{key}: 6", f"\n{key}: 2")
     profile.write_text(text, encoding="utf-8")

@@ -108,7 +108,7 @@ def test_an_inline_device_is_its_base_with_changes(tmp_path: Path) -> None:
 
 def test_a_device_file_is_looked_for_beside_the_job(tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text(
-        (Path(__file__).resolve().parent.parent / "chainsim/profiles/linked-6x6.yaml")
+        (Path(__file__).resolve().parent.parent / "chainsim/model/profiles/linked-6x6.yaml")
         .read_text(encoding="utf-8")
         .replace("name: linked-6x6", "name: mine"),
         encoding="utf-8",

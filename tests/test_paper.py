@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from chainsim import Chain, Setting, solve
-from chainsim.stability.locking import locking
-from chainsim.stability.spectrum import delta_from_critical_lam
+from chainsim.continuation.locking import locking
+from chainsim.continuation.spectrum import delta_from_critical_lam
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ["fig2", "fig4", "fig5", "ranges", "control"]

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, load_device
-from chainsim.calibrated import Actuator
+from chainsim.model.calibrated import Actuator
 from dotwave.calibrate import calibrate
 from dotwave.measured_sweeps import COLUMNS
 from dotwave.pipeline import render_text
@@ -20,7 +20,7 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
 from planner import plan_scene
-from planner.spreading.batch_march import Parts, march
+from planner.robustness.batch_march import Parts, march
 
 Floats = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from chainsim import ProfileError, load_device
 from dotwave.render import render_job
 from dotwave.scene_report import SceneReport
 from dotwave.verify import verify
-from planner.levels.links import drive_for, links_for
-from planner.spreading.batch_march import march
-from planner.spreading.spread import Spread, drawn_in
+from planner.closed_forms.links import drive_for, links_for
+from planner.robustness.batch_march import march
+from planner.robustness.spread import Spread, drawn_in
 
 DEVICE = load_device("linked-6x6")
 PROFILE = [1, 1, 0.1, 0.1, 1, 1]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chainsim import Coupling, Device, Span, load_device
-from planner.levels.band import LONGEST_RAMP_S, choose_band
-from planner.levels.links import drive_for, links_for
+from planner.amplitudes.band import LONGEST_RAMP_S, choose_band
+from planner.closed_forms.links import drive_for, links_for
 
 LINKED = load_device("linked-6x6")
 VIBRATING = ["linked-6x6", "linked-40x96", "independent-6x6"]

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from chainsim import Device, load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import ChainState, FramePlan, Ramp, plan_scene
+from planner.amplitudes.deflection import Deflection
+from planner.amplitudes.vibration import Vibration
 from planner.cache import PlanCache, cache_path
-from planner.levels.deflection import Deflection
-from planner.levels.vibration import Vibration
 from planner.strategy import Strategy
 
 ROOT = Path(__file__).resolve().parent.parent

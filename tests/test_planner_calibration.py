@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, solve
-from planner.spreading.batch_march import Parts, march
-from planner.spreading.calibration import FEWEST_POINTS, ChainFit, Sweep, SweepError, fit_chain
+from planner.identification.calibration import FEWEST_POINTS, ChainFit, Sweep, SweepError, fit_chain
+from planner.robustness.batch_march import Parts, march
 
 Floats = NDArray[np.float64]
 

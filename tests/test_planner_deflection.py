@@ -14,8 +14,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Closure, Device, Outcome, Span, load_device
 from planner import Ramp
-from planner.levels.deflection import Deflection
-from planner.strategy import strategy_for
+from planner.amplitudes.deflection import Deflection
+from planner.families import strategy_for
 
 PAPER = load_device("paper-6x6")
 ROWS = np.array(list(product((0.0, 1.0), repeat=6)))

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Chain, Setting, solve
-from planner.levels.links import drive_for, links_for
-from planner.ways.envelopes import EnvelopeRamp, change, fall, rise
+from planner.closed_forms.links import drive_for, links_for
+from planner.transitions.envelopes import EnvelopeRamp, change, fall, rise
 
 DELTA, OMEGA = 5.3006e-3, 1.8**0.5
 TAU_PER_S = 2 * np.pi * 133.13

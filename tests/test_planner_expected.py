@@ -11,21 +11,21 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
-from chainsim.calibrated import ActuatorSpread
+from chainsim.model.calibrated import ActuatorSpread
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import FramePlan, Plan, plan_scene
+from planner.amplitudes.band import choose_band
+from planner.amplitudes.vibration import Vibration
 from planner.chains import Chains
+from planner.closed_forms.links import drive_for, links_for
 from planner.held import Held
-from planner.levels.band import choose_band
-from planner.levels.links import drive_for, links_for
-from planner.levels.vibration import Vibration
-from planner.spreading import expected as expected_module
-from planner.spreading.expected import WANTED, Expectation
-from planner.spreading.outlook import FrameSpread
-from planner.spreading.robust_aim import aim_for
-from planner.spreading.robust_search import Held as Settings
-from planner.spreading.robust_search import Search, Trial
-from planner.spreading.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
+from planner.outlook import FrameSpread
+from planner.robustness import expected as expected_module
+from planner.robustness.expected import WANTED, Expectation
+from planner.robustness.robust_aim import aim_for
+from planner.robustness.robust_search import Held as Settings
+from planner.robustness.robust_search import Search, Trial
+from planner.robustness.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
 from planner.waves.walking import walking_state
 from planner.wish import ChainWish
 

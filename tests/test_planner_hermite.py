@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from planner.ways.hermite import broken_line
+from planner.transitions.hermite import broken_line
 
 NODES = 41
 T = np.linspace(0.0, 1.0, NODES)

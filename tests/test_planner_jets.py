@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from planner.ways import jets
+from planner.transitions import jets
 
 LENGTH = 10
 X = np.linspace(-1.0, 1.0, 9)

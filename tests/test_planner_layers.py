@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"PIL", "dask", "louis", "matplotlib", "numba", "rich", "scipy", "typer"}
 
-WAYS = {"planner.levels.vibration", "planner.levels.deflection", "planner.waves.wave_state"}
+WAYS = {"planner.amplitudes.vibration", "planner.amplitudes.deflection", "planner.waves.wave_state"}
 
 PLAN = """
 import numpy as np
@@ -42,9 +42,9 @@ def test_importing_the_planner_loads_nothing_heavy() -> None:
 @pytest.mark.parametrize(
     ("name", "frames", "way"),
     [
-        ("paper-6x6", 5, "levels.deflection"),
-        ("linked-6x6", 5, "levels.vibration"),
-        ("independent-6x6", 5, "levels.vibration"),
+        ("paper-6x6", 5, "amplitudes.deflection"),
+        ("linked-6x6", 5, "amplitudes.vibration"),
+        ("independent-6x6", 5, "amplitudes.vibration"),
         ("paper-6x6-ring", 4, "waves.wave_state"),
     ],
 )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from chainsim import Chain, Spread
-from planner.levels.links import detuning_gain, drive_for, links_for, stage_constant
+from planner.closed_forms.links import detuning_gain, drive_for, links_for, stage_constant
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
-from planner.levels.nearest import nearest_geometric
-from planner.strategy import strategy_for
+from planner.closed_forms.nearest import nearest_geometric
+from planner.families import strategy_for
 from planner.waves.wave_state import wave_state
 from planner.wish import ChainWish
 

@@ -13,11 +13,11 @@ from scipy.integrate import solve_ivp
 
 from chainsim import load_device
 from encoders import GridShape, levels, plane_wave, walking_bars
-from planner.price.pareto import RAMPS_S, pareto_of
-from planner.price.pareto_point import ALIKE, RESOLUTION, ParetoError, ParetoPoint, front_of
-from planner.price.pareto_still import PERIODS, ways_of_deflections
+from planner.analysis.pareto import RAMPS_S, pareto_of
+from planner.analysis.pareto_point import ALIKE, RESOLUTION, ParetoError, ParetoPoint, front_of
+from planner.analysis.pareto_still import PERIODS, ways_of_deflections
+from planner.transitions.waves import enter_wave
 from planner.waves.wave_state import wave_state
-from planner.ways.wave_ways import enter_wave
 from planner.wish import wishes_of
 
 SHAPE = GridShape(6, 6)

@@ -27,7 +27,7 @@ from encoders import (
     walking_bars,
 )  # fmt: skip
 from planner import DwellTooShort, FramePlan, Plan, plan_scene
-from planner.waves.fit import Hold, response_to
+from planner.closed_forms.wave_fit import Hold, response_to
 from planner.waves.wave_forms import wave_for
 
 NAMES = ["paper-6x6", "paper-6x6-common", "linked-6x6", "independent-6x6", "ultrasonic-6x6", "paper-6x6-ring"]

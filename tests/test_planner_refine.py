@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, Setting, solve
-from planner.levels import refine as refine_module
-from planner.levels.links import drive_for, links_for
-from planner.levels.refine import Refined, refine
+from planner.amplitudes import refine as refine_module
+from planner.amplitudes.refine import Refined, refine
+from planner.closed_forms.links import drive_for, links_for
 
 CHAIN = Chain(n=6, delta=5.3006e-3, beta=-1.0)
 OMEGA = 1.35

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, load_device, solve
-from chainsim.terms.terms import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
-from chainsim.terms.terms_ode import integrate_terms
+from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
+from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
 from planner import ChainState, FramePlan, Margins, Spread, Tone, plan_scene, spread_of
-from planner.price.effects import StandingChain
-from planner.price.requirement import Requirement, RequirementError, require
-from planner.price.scene_effects import TERMS
+from planner.analysis.effects import StandingChain
+from planner.analysis.requirement import Requirement, RequirementError, require
+from planner.analysis.scene_effects import TERMS
 from planner.surroundings import HigherMode, Surroundings, assumed
-from planner.ways.way_check import Way
+from planner.transitions.check import Way
 
 LINKED = load_device("linked-6x6")
 NOTHING = Surroundings()

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, load_device, solve
-from planner.levels.links import drive_for, links_for
-from planner.levels.vibration import Vibration
-from planner.spreading.robust import Held, RobustError, RobustPlan, Trial, accuracy_needed, hold, robust_plan
-from planner.spreading.robust_search import Search
-from planner.spreading.spread import Spread, Wish, draw, spread_of
+from planner.amplitudes.vibration import Vibration
+from planner.closed_forms.links import drive_for, links_for
+from planner.robustness.robust import Held, RobustError, RobustPlan, Trial, accuracy_needed, hold, robust_plan
+from planner.robustness.robust_search import Search
+from planner.robustness.spread import Spread, Wish, draw, spread_of
 
 Floats = NDArray[np.float64]
 

@@ -277,7 +277,7 @@ def test_a_frame_names_what_the_device_lacks(device: Device) -> None:
 
 def test_a_change_out_of_reach_makes_its_frame_unreachable(monkeypatch: pytest.MonkeyPatch) -> None:
     """States that can be held, with a way between them that the device cannot go."""
-    from planner.levels.vibration import Vibration
+    from planner.amplitudes.vibration import Vibration
 
     monkeypatch.setattr(Vibration, "_lacking", lambda self, made, i, epsilon, lam: "it lacks patience")
     rows = np.tile(np.array([1, 0, 1, 1, 0, 0]), (6, 1))

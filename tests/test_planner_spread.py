@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device, solve
+from planner.amplitudes.deflection import Deflection
+from planner.amplitudes.vibration import Vibration
+from planner.closed_forms.links import drive_for, links_for
 from planner.errors import PlanError
-from planner.levels.deflection import Deflection
-from planner.levels.links import drive_for, links_for
-from planner.levels.vibration import Vibration
 from planner.plan import ChainState, Tone
-from planner.spreading.batch_march import Parts, march
-from planner.spreading.ring_march import march_ring
-from planner.spreading.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
-from planner.spreading.tone_march import march_tones
+from planner.robustness.batch_march import Parts, march
+from planner.robustness.ring_march import march_ring
+from planner.robustness.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
+from planner.robustness.tone_march import march_tones
 from planner.waves.two_tones import MAIN, two_tones
 
 Floats = NDArray[np.float64]

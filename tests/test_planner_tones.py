@@ -15,7 +15,7 @@ from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, w
 from planner import ChainState, ContrastError, FramePlan, Margins, Plan, Ramp, Tone, ToneRamp, plan_scene
 from planner.cache import PlanCache
 from planner.chains import MOST_STATES, Chains
-from planner.ways.joining import as_tone, joined, rest_for, turned_ramp, turned_state
+from planner.transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
 
 SINGLE = load_device("independent-6x6")
 COMMON = load_device("paper-6x6-common")

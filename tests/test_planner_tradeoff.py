@@ -9,9 +9,9 @@ import pytest
 from chainsim import Outcome, Setting, Stats, balance_near, load_device, solve
 from encoders import Frame, GridShape, Scene, TextOptions, TextSource, encode_text, levels
 from planner import FramePlan, Tone, plan_scene
-from planner.price.climbing import climb
-from planner.price.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
-from planner.price.tradeoff import Tradeoff, TradeoffRow, trade_off
+from planner.analysis.climbing import climb
+from planner.analysis.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
+from planner.analysis.tradeoff import Tradeoff, TradeoffRow, trade_off
 
 SHAPE = GridShape(6, 6)
 

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, Setting, balance_near, load_device, solve
-from chainsim.calibrated import Actuator
+from chainsim.model.calibrated import Actuator
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
+from planner.amplitudes import vibration as vibration_module
+from planner.amplitudes.refine import refine
 from planner.cache import PlanCache
 from planner.chains import Chains
-from planner.levels import vibration as vibration_module
-from planner.levels.refine import refine
 from planner.plan import ChainState
 from planner.unequal import UnequalChains
 

@@ -12,8 +12,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Device, Outcome, Span, load_device
 from planner import ChainState, Ramp
-from planner.levels.vibration import Vibration
-from planner.strategy import strategy_for
+from planner.amplitudes.vibration import Vibration
+from planner.families import strategy_for
 
 LINKED = load_device("linked-6x6")
 SINGLE = load_device("independent-6x6")

@@ -13,9 +13,9 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TextureError, walking_bars
 from planner import ChainState, Plan, plan_scene
+from planner.transitions.waves import enter_wave
 from planner.waves.two_tones import MAIN, apart
 from planner.waves.walking import walking_rate_hz, walking_state
-from planner.ways.wave_ways import enter_wave
 from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, SINGLE = (load_device(name) for name in ("paper-6x6", "linked-6x6", "independent-6x6"))

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setting, Span, load_device, solve
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
 from planner import ChainState
+from planner.closed_forms.wave_fit import Freedom, Hold, Wanted, fit, response_to
 from planner.margins import converter_error
-from planner.waves.fit import Freedom, Hold, Wanted, fit, response_to
+from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.two_tones import MAIN, ORDERS, two_tones
 from planner.waves.wave_forms import lag_and_ratio, wave_for, wave_on
 from planner.waves.wave_state import wave_state
-from planner.ways.wave_ways import enter_wave, leave_wave
 from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, COMMON, SINGLE = (

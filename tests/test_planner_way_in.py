@@ -13,13 +13,13 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device
-from planner.levels.refine import refine
+from planner.amplitudes.refine import refine
 from planner.plan import Ramp
-from planner.ways.steering import LinkCourse, Standing, Steering, rest
-from planner.ways.way_in import find_way
-from planner.ways.way_limits import WayError, WayLimits
-from planner.ways.way_out import find_fall
-from planner.ways.way_search import Search
+from planner.transitions.fall import find_fall
+from planner.transitions.limits import WayError, WayLimits
+from planner.transitions.rise import find_way
+from planner.transitions.search import Search
+from planner.transitions.steering import LinkCourse, Standing, Steering, rest
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

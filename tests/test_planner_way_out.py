@@ -16,12 +16,12 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, plane_wave
 from planner import Plan, Ramp, plan_scene
+from planner.transitions.check import SAMPLES_PER_PERIOD, Orbit, Way, travel
+from planner.transitions.fall import CALM, find_fall
+from planner.transitions.limits import WayLimits
+from planner.transitions.rise import orbit_of
+from planner.transitions.steering import LinkCourse, Standing, Steering, rest, smooth_step
 from planner.waves.wave_state import wave_state
-from planner.ways.steering import LinkCourse, Standing, Steering, rest, smooth_step
-from planner.ways.way_check import SAMPLES_PER_PERIOD, Orbit, Way, travel
-from planner.ways.way_in import orbit_of
-from planner.ways.way_limits import WayLimits
-from planner.ways.way_out import CALM, find_fall
 from planner.wish import ChainWish, wishes_of
 
 Floats = NDArray[np.float64]

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from chainsim import Chain, load_device
+from planner.amplitudes import refine
+from planner.amplitudes.vibration import Vibration
 from planner.cache import ASKED_AT_ONCE, PlanCache
-from planner.levels import refine
-from planner.levels.links import links_for
-from planner.levels.vibration import Vibration
+from planner.closed_forms.links import links_for
 from planner.plan import Ramp
-from planner.ways import jets
-from planner.ways.blending import _kinds, blended
-from planner.ways.envelopes import POINTS, change
-from planner.ways.resample import chebyshev_points, converged, resampled
+from planner.transitions import jets
+from planner.transitions.blending import _kinds, blended
+from planner.transitions.envelopes import POINTS, change
+from planner.transitions.resample import chebyshev_points, converged, resampled
 
 LINKED = load_device("linked-6x6")
 CHAIN, OMEGA = LINKED.chain, 1.35

@@ -6,8 +6,8 @@ import numpy as np
 
 from chainsim import Chain, Setting, solve
 
-from ..levels.links import drive_for
-from .fit import Freedom, Hold, Wanted
+from ..closed_forms.links import drive_for
+from ..closed_forms.wave_fit import Freedom, Hold, Wanted
 
 __all__ = ["search"]
 

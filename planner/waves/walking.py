@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
 
-from ..levels.links import detuning_gain
+from ..closed_forms.links import detuning_gain
 from ..margins import lacking_of, slew_of
 from ..plan import ChainState, Margins, Tone
 from ..wish import ChainWish

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
 
-from ..levels.nearest import nearest_geometric
+from ..closed_forms.nearest import nearest_geometric
+from ..closed_forms.wave_fit import Fitted, Freedom, Hold, Wanted, fit
 from ..wish import ChainWish
-from .fit import Fitted, Freedom, Hold, Wanted, fit
 from .search import search
 from .wave_forms import Wave, lag_and_ratio, wave_for, wave_on
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
 
-from ..levels.links import detuning_gain
-from ..levels.nearest import nearest_geometric
+from ..closed_forms.links import detuning_gain
+from ..closed_forms.nearest import nearest_geometric
+from ..closed_forms.wave_fit import Fitted
 from ..margins import converter_error, lacking_of, slew_of, well_of
 from ..plan import ChainState, Margins
 from ..wish import ChainWish
-from .fit import Fitted
 from .wave_fit import GOOD, WaveFit
 
 __all__ = ["wave_state"]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Outcome, Setting, solve
-from chainsim.slow.envelope_settle import reached
-from chainsim.stability.spectrum import delta_from_critical_lam
+from chainsim.averaging.settle import reached
+from chainsim.continuation.spectrum import delta_from_critical_lam
 
 from .page import BLUE, GREEN, GREY, ORANGE, RED, Finding, Page, sheet
 from .states import EPSILON_B, LAM

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chainsim.stability.spectrum import critical_lam, delta_from_critical_lam, peak_gain, spectrum_curve
+from chainsim.continuation.spectrum import critical_lam, delta_from_critical_lam, peak_gain, spectrum_curve
 
 from .page import BLUE, GREEN, GREY, ORANGE, RED, Finding, Page, sheet
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Outcome, Setting, reached_from_rest
-from chainsim.stability.locking import locking
-from chainsim.stability.spectrum import delta_from_critical_lam
+from chainsim.continuation.locking import locking
+from chainsim.continuation.spectrum import delta_from_critical_lam
 
 from .page import RED, Finding, Page, sheet
 

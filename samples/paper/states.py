@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Setting, balance_near, solve
-from chainsim.slow.envelope import follow
-from chainsim.stability.continuation import continue_branch
-from chainsim.stability.locking import locking
-from chainsim.stability.spectrum import delta_from_critical_lam
+from chainsim.averaging.envelope import follow
+from chainsim.continuation.continuation import continue_branch
+from chainsim.continuation.locking import locking
+from chainsim.continuation.spectrum import delta_from_critical_lam
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
 

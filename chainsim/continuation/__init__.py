@@ -1,0 +1,3 @@
+"""Branches of answers along a parameter: folds, critical coupling, locking."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""Multipliers of a known periodic motion."""
+
+__all__: list[str] = []

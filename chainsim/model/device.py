@@ -1,0 +1,301 @@
+"""The hardware as built: one `Device`, read from a YAML profile; the only place where SI meets dimensionless."""
+
+from __future__ import annotations
+
+import math
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..errors import ProfileError
+from ..yamlfile import read_model
+from .calibrated import Actuator, ActuatorSpread, misplaced
+from .chain import Chain, Closure
+
+__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+
+PROFILES = Path(__file__).parent / "profiles"
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=1024)]
+Bits = Annotated[int, Field(ge=1, le=32)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Span(_Part):
+    """A closed range of what a device can set."""
+
+    min: NotNegative
+    max: NotNegative
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Span:
+        if self.min > self.max:
+            raise ValueError(f"min {self.min} is above max {self.max}; swap them")
+        return self
+
+
+class Coupling(_Part):
+    """How actuators of a chain are coupled.
+
+    `scope` is what one lam belongs to: every link has its own (`link`), one for a chain (`chain`), one
+    for the whole device (`device`), one that was built in and cannot be set (`fixed`), or the actuators are
+    not coupled (`none`). With `bits`, lam can be set to 2^bits values from lam.min to lam.max; None is any.
+    """
+
+    closure: Closure = Closure.OPEN
+    scope: Literal["none", "fixed", "device", "chain", "link"]
+    lam: Span = Span(min=0.0, max=0.0)
+    bits: Bits | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Coupling:
+        if self.closure is Closure.BIDIRECTIONAL:
+            raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
+        if self.scope == "none" and self.lam.max > 0:
+            raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
+        if self.scope == "fixed" and self.lam.min != self.lam.max:
+            raise ValueError(f"scope fixed has one lam, got {self.lam.min} to {self.lam.max}; make min and max equal")
+        return self
+
+    @property
+    def lam_step(self) -> float:
+        """From one lam that can be set to the next; 0 where any can."""
+        return 0.0 if self.bits is None else (self.lam.max - self.lam.min) / (2**self.bits - 1)
+
+
+class Amplifier(_Part):
+    """What every output channel can do.
+
+    With `bits`, its converter makes 2^bits - 1 voltages from -volts to volts, 0 among them; None is any.
+    """
+
+    volts: Positive
+    slew_v_per_s: Positive
+    rate_hz: Annotated[int, Field(ge=100, le=10_000_000)]
+    bits: Annotated[int, Field(ge=2, le=32)] | None = None
+
+    @property
+    def volt_step(self) -> float:
+        """From one voltage to the next; 0 where any can be made."""
+        return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
+
+
+class Note(_Part):
+    """Where a value of the profile comes from."""
+
+    assumed: bool
+    why: Annotated[str, Field(min_length=1)]
+
+
+class _Places:
+    """Measured actuators by row and column."""
+
+    def __init__(self, actuators: tuple[Actuator, ...]) -> None:
+        self.actuators = actuators
+        self.at = {(one.row, one.col): one for one in actuators}
+
+
+class Device(_Part):
+    """A grid of actuators, its chains, its drive and its amplifier.
+
+    Each row is cut into chains of `chain_length` actuators, which must divide `cols`; the first actuator
+    of every chain is driven. A dimensionless amplitude z is ``z * length_m`` metres; the target 1 of a
+    pattern is the amplitude `full_scale`.
+
+    Attributes
+    ----------
+    rows, cols : size of the grid. `pitch_m` : distance between neighbours in metres.
+    f0_hz : resonance of one actuator in hertz; tau = 2 pi f0_hz t.
+    delta, beta : damping and cubic term of `chainsim.Chain`.
+    length_m : metres per unit of z.
+    full_scale : dimensionless amplitude of target 1.
+    epsilon_per_volt, bias_per_volt : dimensionless force per volt at the actuator (drive, bias).
+    omega : drive frequencies the device can make, over f0.
+    drive : whether every chain has its own drive, or all chains are driven alike (`device`).
+    bias : whether every actuator has its own DC bias channel.
+    actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
+    spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
+        lam: 0.0}`` (relative standard deviations). Plans then minimise the expected error. None: they are as they say.
+    notes : field name -> where the value comes from.
+    """
+
+    schema_: Literal["dotwave/device/1"] = Field("dotwave/device/1", alias="schema")
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    description: str = ""
+    rows: Count
+    cols: Count
+    chain_length: Count
+    pitch_m: Positive
+    f0_hz: Positive
+    delta: Annotated[float, Field(gt=0, lt=1)]
+    beta: Finite
+    length_m: Positive
+    full_scale: Positive
+    epsilon_per_volt: Positive
+    bias_per_volt: Positive
+    omega: Span
+    coupling: Coupling
+    drive: Literal["chain", "device"] = "chain"
+    bias: Literal["none", "actuator"]
+    amplifier: Amplifier
+    actuators: tuple[Actuator, ...] = ()
+    spread: ActuatorSpread | None = None
+    notes: dict[str, Note] = {}
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Device:
+        if self.cols % self.chain_length:
+            raise ValueError(f"chain_length {self.chain_length} does not divide cols {self.cols}")
+        if self.omega.min <= 0:
+            raise ValueError("omega.min must be above 0")
+        if self.coupling.scope == "none" and self.chain_length > 1:
+            raise ValueError("coupling.scope none needs chain_length 1")
+        wrong = misplaced(self.actuators, self.rows, self.cols, self.chain_length)
+        if wrong:
+            raise ValueError(wrong)
+        unknown = sorted(set(self.notes) - set(type(self).model_fields))
+        if unknown:
+            raise ValueError(f"notes.{unknown[0]}: the profile has no such field")
+        if self.beta < 0 and self.full_scale >= self.escape_amplitude:
+            raise ValueError(
+                f"full_scale {self.full_scale} is beyond the softening hilltop {self.escape_amplitude:.4g}"
+            )
+        return self
+
+    @property
+    def chains_per_row(self) -> int:
+        """How many chains a row has."""
+        return self.cols // self.chain_length
+
+    @property
+    def chain(self) -> Chain:
+        """One chain of the device, for the solvers: as measured where there is no other, else as the profile says."""
+        if self.actuators and self.rows * self.chains_per_row == 1:
+            return self.chain_at(0)
+        return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure)
+
+    def chain_at(self, row: int, index: int = 0) -> Chain:
+        """Chain `index` of `row` (both from 0) with the numbers of its actuators."""
+        measured = self._measured(row, index)
+        return Chain.of(
+            self.chain_length,
+            delta=[self.delta if one is None or one.delta is None else one.delta for one in measured],
+            beta=[self.beta if one is None or one.beta is None else one.beta for one in measured],
+            stiffness=[1.0 if one is None or one.f0_hz is None else (one.f0_hz / self.f0_hz) ** 2 for one in measured],
+            closure=self.coupling.closure,
+        )
+
+    def lam_gain(self, row: int, index: int = 0) -> NDArray[np.float64]:
+        """What the links of a chain make of the lam they are set to; float64, shape (n-1,), 1 where not measured."""
+        return np.array(
+            [
+                1.0 if one is None or one.lam is None or one.lam_set is None else one.lam / one.lam_set
+                for one in self._measured(row, index)[1:]
+            ]
+        )
+
+    def drive_per_volt(self, row: int, index: int = 0) -> float:
+        """Dimensionless force per volt on the first actuator of a chain."""
+        first = self._measured(row, index)[0]
+        return self.epsilon_per_volt if first is None or first.epsilon_per_volt is None else first.epsilon_per_volt
+
+    def alone(self, row: int, index: int = 0) -> Device:
+        """A device of nothing but this chain, with its own numbers; equal chains give equal devices.
+
+        Where a lam belongs to more than one link its range is what links make of it on average, and `lam_gain` how
+        much each differs from that; `drive_per_volt` has become `epsilon_per_volt`.
+        """
+        gain, unit = self.lam_gain(row, index), self.lam_unit(row, index)
+        chain, lam = self.chain_at(row, index), self.coupling.lam
+        own: tuple[Actuator, ...] = ()
+        if chain.spread is not None or np.any(gain != unit):
+            numbers = np.broadcast_arrays(chain.stiffness, chain.deltas, chain.betas, np.append(1.0, gain / unit))
+            own = tuple(
+                Actuator(
+                    row=0, col=col, f0_hz=self.f0_hz * math.sqrt(stiffness), delta=delta, beta=beta,
+                    lam=factor if col else None, lam_set=1.0 if col else None,
+                )
+                for col, (stiffness, delta, beta, factor) in enumerate(zip(*(n.tolist() for n in numbers), strict=True))
+            )  # fmt: skip
+        span = Span(min=lam.min * unit, max=lam.max * unit)
+        return self.model_copy(
+            update={
+                "rows": 1, "cols": self.chain_length, "delta": chain.delta, "beta": chain.beta,
+                "epsilon_per_volt": self.drive_per_volt(row, index), "actuators": own,
+                "coupling": self.coupling.model_copy(update={"lam": span}),
+            }
+        )  # fmt: skip
+
+    def lam_unit(self, row: int, index: int = 0) -> float:
+        """What the links of a chain make of a lam of 1 they share, on average; 1 where each has its own."""
+        gain = self.lam_gain(row, index)
+        return 1.0 if self.coupling.scope == "link" or not len(gain) else float(np.mean(gain))
+
+    def _measured(self, row: int, index: int) -> list[Actuator | None]:
+        known = self._places
+        if known.actuators is not self.actuators:
+            # A copy with other actuators has brought the places of those it had before.
+            known = self.__dict__["_places"] = _Places(self.actuators)
+        start = index * self.chain_length
+        return [known.at.get((row, col)) for col in range(start, start + self.chain_length)]
+
+    @cached_property
+    def _places(self) -> _Places:
+        return _Places(self.actuators)
+
+    @property
+    def escape_amplitude(self) -> float:
+        """Dimensionless hilltop sqrt(1/|beta|) of an uncoupled actuator; infinite unless beta < 0."""
+        return math.sqrt(-1.0 / self.beta) if self.beta < 0 else math.inf
+
+    @property
+    def tau_per_s(self) -> float:
+        """tau = tau_per_s * t."""
+        return 2 * math.pi * self.f0_hz
+
+    @property
+    def epsilon_max(self) -> float:
+        """Largest dimensionless drive the amplifier can give."""
+        return self.amplifier.volts * self.epsilon_per_volt
+
+    @property
+    def bias_max(self) -> float:
+        """Largest dimensionless bias the amplifier can give."""
+        return self.amplifier.volts * self.bias_per_volt
+
+    def as_dict(self) -> dict[str, Any]:
+        """The whole profile in plain JSON types, as it stands in a manifest."""
+        left_out = {"spread"} if self.spread is None else set()
+        return self.model_dump(mode="json", by_alias=True, exclude=left_out)
+
+
+def device_names() -> list[str]:
+    """Names of the built-in profiles, sorted."""
+    return sorted(path.stem for path in PROFILES.glob("*.yaml"))
+
+
+@cache
+def load_device(name: str) -> Device:
+    """A built-in profile by name, or the profile in the YAML file of that path.
+
+    Raises
+    ------
+    ProfileError
+        When there is no such profile or file, or the file does not fit; the message says where.
+    """
+    if name in device_names():
+        return read_model(PROFILES / f"{name}.yaml", Device)
+    path = Path(name)
+    if path.suffix.lower() in {".yaml", ".yml"} or path.is_file():
+        return read_model(path, Device)
+    raise ProfileError(f"device {name!r}: not a built-in profile ({', '.join(device_names())}) and not a .yaml file")

@@ -1,3 +1,0 @@
-"""What moves: the full equations in time, and the periodic motions they settle to."""
-
-__all__: list[str] = []

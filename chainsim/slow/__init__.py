@@ -1,3 +1,0 @@
-"""What moves slowly: complex amplitudes in place of the vibration itself."""
-
-__all__: list[str] = []

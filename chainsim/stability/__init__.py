@@ -1,3 +1,0 @@
-"""What lasts: eigenvalues, multipliers, folds, locking."""
-
-__all__: list[str] = []

@@ -1,0 +1,140 @@
+"""Patterns held still by a DC bias on every actuator (the paper's goal 1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Outcome, Setting, solve
+
+from ..closed_forms.links import stages
+from ..margins import WELL_SHARE
+from ..plan import ChainState, Margins, Ramp
+from ..strategy import Strategy
+from ..transitions import jets
+
+__all__ = ["Deflection"]
+
+Floats = NDArray[np.float64]
+
+# A blend of eight resonance periods, smooth to the fifth derivative, has next to no content at the resonance:
+# the bias that follows it exactly hardly differs from the static one, and an actuator whose f0 is a few per
+# cent off does not ring.
+RAMP_PERIODS = 8
+SMOOTHNESS = 5
+NODES = 65
+TOL = 1e-12
+
+
+class Deflection(Strategy):
+    """b_m = z_m + beta z_m^3 - lam (z_{m-1} - z_m) for any wanted deflection, with the smallest lam there is."""
+
+    @property
+    def ramp_s(self) -> float:
+        """Length of every ramp in seconds."""
+        return RAMP_PERIODS / self.device.f0_hz
+
+    def held(self, target: Floats, started: bool) -> Floats:
+        """Just what is wanted: a still actuator costs nothing."""
+        return target
+
+    def _bias(self, z: Floats, force: Floats) -> Floats:
+        """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
+        before, own = np.roll(z, 1, axis=-1), stages(self.device.chain)
+        links = self._links.copy()
+        if self.device.coupling.closure is Closure.OPEN:
+            links[0] = 0.0
+        return np.asarray(force + own.stiffness * z + own.beta * z**3 - links * (before - z))
+
+    @property
+    def _links(self) -> Floats:
+        """What the links into each actuator make of the smallest lam; the first of a ring closes it."""
+        device = self.device
+        links = np.full(device.chain_length, device.coupling.lam.min)
+        if device.actuators and device.rows * device.chains_per_row == 1:
+            links[1:] *= device.lam_gain(0)
+        return links
+
+    def states(self, targets: Floats) -> list[ChainState]:
+        """Static settings for `targets`, checked by the static solver."""
+        device = self.device
+        biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
+        step = device.amplifier.volt_step * device.bias_per_volt
+        if step:
+            biases = step * np.rint(biases / step)
+        ring = device.coupling.closure is Closure.RING
+        lam, links = self._links[1:], self._links if ring else self._links[1:]
+        setting = Setting.of(device.chain, epsilon=0.0, lam=links if len(links) else 0.0, omega=1.0, bias=biases)
+        rung = "auto" if ring else "static"
+        response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
+        error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
+        return [
+            ChainState(
+                target=targets[i],
+                epsilon=0j,
+                lam=lam,
+                bias=biases[i],
+                omega=1.0,
+                phasor=np.zeros(device.chain_length, dtype=np.complex128),
+                mean=response.mean[i],
+                error=float(error[i]),
+                margins=self._margins(biases[i]),
+                outcome=self._outcome(response.outcome[i], targets[i], biases[i]),
+                lacking=self._lacking(targets[i], biases[i]),
+            )
+            for i in range(len(targets))
+        ]
+
+    def _margins(self, bias: Floats) -> Margins:
+        own = stages(self.device.chain)
+        soft = np.minimum(own.beta, 0.0)
+        with np.errstate(divide="ignore"):
+            fold = 2 * np.power(own.stiffness, 1.5) / (3 * np.sqrt(3 * -soft))
+        volts = float(np.abs(bias).max()) / self.device.bias_max
+        return Margins(volts=volts, well=float((np.abs(bias) / fold).max()))
+
+    def _outcome(self, solved: Outcome, target: Floats, bias: Floats) -> Outcome:
+        return Outcome.UNREACHABLE if solved is Outcome.OK and self._lacking(target, bias) else solved
+
+    def _lacking(self, target: Floats, bias: Floats) -> str:
+        device, margins = self.device, self._margins(bias)
+        if margins.volts > 1:
+            share = f"{100 * margins.volts:.0f} % of the amplifier's volts"
+            return f"it takes {share}; it lacks volts, or a lower full_scale"
+        # Past the fold the bias that balances a deflection falls again, but nothing stable stands there.
+        own = stages(device.chain)
+        stiffness = own.stiffness + device.coupling.lam.min + 3 * own.beta * (target * device.full_scale) ** 2
+        if np.any(stiffness <= 0):
+            return "it lies beyond the fold of the softening well; it lacks depth of the well, or a lower full_scale"
+        if margins.well > WELL_SHARE:
+            return (
+                f"its bias is {100 * margins.well:.0f} % of that at which the well folds, {100 * WELL_SHARE:.0f} % are "
+                "allowed; it lacks depth of the well, or a lower full_scale"
+            )
+        return ""
+
+    def note(self) -> str:
+        """What is lacking when a deflection cannot be held."""
+        return f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well."
+
+    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+        """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
+        duration = self.ramp_s * self.device.tau_per_s
+        blend = jets.smoothstep(SMOOTHNESS, NODES, 4)
+        x = np.linspace(0.0, self.ramp_s, NODES)
+        out: list[Ramp | None] = []
+        for one, other in zip(before, after, strict=True):
+            step = (other.target - one.target) * self.device.full_scale
+            if not np.any(step):
+                out.append(None)
+                continue
+            z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))
+            z = z + one.target * self.device.full_scale
+            own = stages(self.device.chain)
+            bias = self._bias(z, push + own.delta * speed)
+            linear = self._bias(speed, jerk + own.delta * push)
+            slope = linear + own.beta * (3 * z**2 * speed - speed**3)
+            out.append(Ramp(t_s=x, bias=bias, bias_slope=slope * self.device.tau_per_s))
+        return out

@@ -1,0 +1,267 @@
+"""Patterns held by vibration: a drive per chain, a lam on every link, no bias."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device, Outcome
+
+from ..closed_forms.links import detuning_gain, links_for
+from ..closed_forms.wave_fit import Hold
+from ..margins import WELL_SHARE, converter_error, lacking_of, slew_of
+from ..plan import ChainState, Margins, Ramp
+from ..strategy import Strategy
+from ..transitions import jets
+from ..transitions.envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
+from ..transitions.hermite import broken_line
+from .band import NODES_PER_RAMP, Band, choose_band
+from .floor import idle_profiles
+from .refine import Refined, refine
+
+__all__ = ["Vibration"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+# Straight pieces a link's way is cut into: short against the beats of drive and stage resonance.
+PIECE_S = 2.5e-3
+# Where a state magnifies disturbances this much, shorter ones: the line's error is one of them.
+FINE_PIECE_S = 1.5e-3
+DELICATE = 1e6
+
+
+class Vibration(Strategy):
+    """Amplitude profiles by closed-form links, refined on harmonic balance; flat ramps between them."""
+
+    def __init__(
+        self, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: Vibration | None = None
+    ) -> None:
+        """`kinds`, `whole` : as in `strategy_for`; all chains of a device share one band."""
+        super().__init__(device)
+        self.contrast_db = contrast_db
+        self._kinds, self._whole = kinds, whole
+
+    @cached_property
+    def band(self) -> Band:
+        """Frequency, ramp length and floor; chosen once."""
+        return self._whole.band if self._whole else choose_band(self.device, self.contrast_db, self._kinds)
+
+    @property
+    def ramp_s(self) -> float:
+        """Length of the longest ramps in seconds."""
+        return self.band.ramp_s
+
+    def held(self, target: Floats, started: bool) -> Floats:
+        """A chain rests until its first dot; after it, unraised dots idle near the floor, for fast changes.
+
+        Each takes the floor or half of it, whichever mix magnifies disturbances of the drive least: equal
+        neighbours resonate alike, and five alike magnify a disturbance a billion times.
+        """
+        if not started and not np.any(target):
+            return target
+        profiles = idle_profiles(target, self.band.floor, self.band.lower)
+        if len(profiles) == 1:
+            return np.asarray(profiles[0])
+        amplitude = profiles * self.device.full_scale
+        lam = links_for(self.device.chain, amplitude, self.band.omega)
+        gain = detuning_gain(self.device.chain, amplitude, lam, self.band.omega)
+        return np.asarray(profiles[int(np.argmin(np.where(np.isfinite(gain), gain, np.inf)))])
+
+    def note(self) -> str:
+        """What is lacking."""
+        return f"{self.device.name} cannot make this pattern by vibration: {self.band.lacking or 'it is out of reach'}."
+
+    def states(self, targets: Floats) -> list[ChainState]:
+        """Settings for amplitude targets; all zero is rest, and so is what no links can hold (unreachable).
+
+        Under spread the states aim beside the targets, where the expected error is least.
+        """
+        if self.device.spread is None:
+            return self._exact(targets)
+        aims = self._aims(targets)
+        found = self._exact(aims)
+        for i in np.flatnonzero(np.any(aims != targets, axis=1)):
+            if found[i].outcome is not Outcome.OK:
+                found[i] = self._exact(targets[[i]])[0]
+        return [self._rounded(state) for state in found]
+
+    def _aims(self, targets: Floats) -> Floats:
+        from ..robustness.robust_aim import aim_for
+
+        amplitude = targets * self.device.full_scale
+        known = np.any(targets > 0, axis=1)
+        known[known] = np.isfinite(links_for(self.device.chain, amplitude[known], self.band.omega)).all(axis=1)
+        whole = (self._whole or self).device
+        common = self.band.omega, whole.rows * whole.chains_per_row
+        pairs = zip(targets, known, strict=True)
+        return np.array([aim_for(self.device, one, *common) if fine else one for one, fine in pairs])
+
+    def _rounded(self, state: ChainState) -> ChainState:
+        """With what the steps of a converter leave."""
+        noise = converter_error(self.device, Hold(state.epsilon, state.lam, state.omega)) if state.epsilon else 0.0
+        return replace(state, error=state.error + noise / self.device.full_scale)
+
+    def _exact(self, targets: Floats) -> list[ChainState]:
+        chain, omega = self.device.chain, self.band.omega
+        moving = np.flatnonzero(np.any(targets > 0, axis=1))
+        amplitude = targets[moving] * self.device.full_scale
+        holdable = np.isfinite(links_for(chain, amplitude, omega)).all(axis=1)
+        held, amplitude = moving[holdable], amplitude[holdable]
+        states: dict[int, ChainState | None] = dict.fromkeys(range(len(targets)))
+        if len(held):
+            found = refine(chain, amplitude, omega)
+            gain = detuning_gain(chain, amplitude, found.lam, omega)
+            made = (self._state(targets[index], found, place, gain[place]) for place, index in enumerate(held))
+            states.update(zip(held.tolist(), made, strict=True))
+        return [state or self._rest(targets[index]) for index, state in states.items()]
+
+    def _rest(self, target: Floats) -> ChainState:
+        n = self.device.chain_length
+        return ChainState(
+            target=target,
+            epsilon=0j,
+            lam=np.full(n - 1, self.device.coupling.lam.min),
+            bias=np.zeros(n),
+            omega=self.band.omega,
+            phasor=np.zeros(n, dtype=np.complex128),
+            mean=np.zeros(n),
+            error=float(target.max()),
+            margins=Margins(volts=0.0, well=0.0),
+            outcome=Outcome.UNREACHABLE if np.any(target) else Outcome.OK,
+        )
+
+    def _state(self, target: Floats, found: Refined, i: int, gain: float) -> ChainState:
+        device = self.device
+        margins = Margins(
+            volts=abs(found.epsilon[i]) / device.epsilon_max,
+            well=float(np.abs(found.phasor[i]).max()) / device.escape_amplitude,
+            noise_gain=float(gain),
+            slew=slew_of(device, abs(found.epsilon[i]), self.band.omega),
+        )
+        return ChainState(
+            target=target,
+            epsilon=complex(found.epsilon[i]),
+            lam=found.lam[i],
+            bias=np.zeros(device.chain_length),
+            omega=self.band.omega,
+            phasor=found.phasor[i],
+            mean=np.zeros(device.chain_length),
+            error=float(found.error[i]) / device.full_scale,
+            margins=margins,
+            outcome=self._outcome(found.outcome[i], found.lam[i], margins),
+            lacking="" if self.band.lacking else lacking_of(margins),
+        )
+
+    def _outcome(self, solved: Outcome, lam: Floats, margins: Margins) -> Outcome:
+        outside = self._outside(lam)
+        if solved is Outcome.OK and (self.band.lacking or outside or lacking_of(margins)):
+            return Outcome.UNREACHABLE
+        return solved
+
+    def _outside(self, lam: Floats) -> bool:
+        """Whether links of shape (..., n-1) must be set beyond their range."""
+        allowed, device = self.device.coupling.lam, self.device
+        if device.actuators and device.rows * device.chains_per_row == 1:
+            lam = lam / device.lam_gain(0)
+        return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
+
+    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+        """From rest and to rest along the flat output; between patterns with links that vary in time."""
+        chain, band = self.device.chain, self.band
+        old = np.array([_standing(state) for state in before]) * self.device.full_scale
+        new = np.array([_standing(state) for state in after]) * self.device.full_scale
+        moved: Mask = np.any(old != new, axis=1)
+        # A single actuator has no links to divide by zero amplitude: every way is a plain change.
+        resting: Mask = np.logical_and(~old.any(axis=1), chain.n > 1)
+        stopping: Mask = np.logical_and(~new.any(axis=1), chain.n > 1)
+        out: list[Ramp | None] = [None] * len(after)
+
+        def fill(chosen: Mask, way: Callable[..., EnvelopeRamp], ramp_s: float, *ends: Floats) -> None:
+            index = np.flatnonzero(chosen & moved)
+            if len(index):
+                duration = ramp_s * self.device.tau_per_s
+                made = way(chain, *(end[index] for end in ends), band.omega, duration, NODES_PER_RAMP)
+                ramps = self._ramps(made, ramp_s, [before[i] for i in index], [after[i] for i in index])
+                for i, ramp in zip(index, ramps, strict=True):
+                    out[i] = ramp
+
+        fill(resting & ~stopping, rise, band.rise_s, new)
+        fill(stopping & ~resting, fall, band.ramp_s, old)
+        fill(~resting & ~stopping, change, band.ramp_s, old, new)
+        return out
+
+    def _ramps(
+        self, made: EnvelopeRamp, ramp_s: float, before: list[ChainState], after: list[ChainState]
+    ) -> list[Ramp]:
+        """Ramps moved by the little that separates their closed-form ends from the refined states."""
+        blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)
+        first, last = (
+            np.array([state.epsilon for state in states]) - made.epsilon[:, end]
+            for states, end in ((before, 0), (after, -1))
+        )
+        epsilon = made.epsilon + first[:, None] + (last - first)[:, None] * blend[0]
+        slope = made.epsilon_slope * self.device.tau_per_s + (last - first)[:, None] * blend[1] / ramp_s
+        t_s = np.linspace(0.0, ramp_s, NODES_PER_RAMP)
+        courses = self._courses(made, ramp_s, before, after)
+        t_of = {len(lam): np.linspace(0.0, ramp_s, len(lam)) for lam in courses}
+        peak = np.abs(epsilon).max(axis=1)
+        return [
+            Ramp(
+                t_s=t_s,
+                epsilon=epsilon[i],
+                epsilon_slope=slope[i],
+                lam_t_s=t_of[len(lam)] if lam.size else None,
+                lam=lam if lam.size else None,
+                lacking=self._lacking(made, i, float(peak[i]), lam),
+            )
+            for i, lam in enumerate(courses)
+        ]
+
+    def _courses(
+        self, made: EnvelopeRamp, ramp_s: float, before: list[ChainState], after: list[ChainState]
+    ) -> list[Floats]:
+        """What the links of every ramp do in straight pieces; float64, shape (pieces + 1, n-1) each."""
+        blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)[0]
+        ends = list(zip(before, after, strict=True))
+        delicate = np.array([max(one.margins.noise_gain, other.margins.noise_gain) > DELICATE for one, other in ends])
+        courses: list[Floats] = [np.empty((0, 0))] * len(ends)
+        for chosen, piece_s in ((~delicate, PIECE_S), (delicate, FINE_PIECE_S)):
+            index = np.flatnonzero(chosen)
+            if not len(index):
+                continue
+            pieces = max(2, math.ceil(ramp_s / piece_s))
+            slope_per_ramp = made.lam_slope[index] * (ramp_s * self.device.tau_per_s)
+            lam = broken_line(made.lam[index], slope_per_ramp, pieces)
+            # At rest the links are free: they take the pattern's values for the whole of a rise or fall.
+            start = np.array([(one if np.any(one.phasor) else other).lam for one, other in (ends[i] for i in index)])
+            end = np.array([(other if np.any(other.phasor) else one).lam for one, other in (ends[i] for i in index)])
+            x = np.linspace(0.0, 1.0, pieces + 1)
+            step = np.interp(x, np.linspace(0.0, 1.0, NODES_PER_RAMP), blend)[:, None]
+            lam += (start - lam[:, 0])[:, None] * (1 - step) + (end - lam[:, -1])[:, None] * step
+            for i, course in zip(index, lam, strict=True):
+                courses[i] = course
+        return courses
+
+    def _lacking(self, made: EnvelopeRamp, i: int, peak: float, lam: Floats) -> str:
+        device, allowed = self.device, self.device.coupling.lam
+        if not made.possible[i]:
+            return "its links cannot follow the change in this time; it lacks detuning (a higher omega.max)"
+        if peak > device.epsilon_max:
+            return f"the change takes {peak / device.epsilon_per_volt:.3g} V; it lacks volts"
+        if lam.size and (lam.min() < allowed.min or lam.max() > allowed.max):
+            return f"the change takes links of {lam.min():.3g}..{lam.max():.3g}; it lacks range of lam"
+        if made.peak[i].max() > device.escape_amplitude * WELL_SHARE:
+            return "the change comes too near the edge of the softening well; it lacks time"
+        return ""
+
+
+def _standing(state: ChainState) -> Floats:
+    """The target a state stands at: nothing where it could only stay at rest."""
+    return state.target if np.any(state.phasor) else np.zeros_like(state.target)

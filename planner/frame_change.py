@@ -1,0 +1,117 @@
+"""How all chains of a device go from one pattern to the next, when some things are common to all of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chainsim import Outcome
+
+from .chains import Chains, Held
+from .plan import ChainState, Ramp
+
+__all__ = ["Change", "change_to"]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What every chain holds after a change, and its way there; row by row, chain by chain."""
+
+    held: list[Held]
+    states: tuple[ChainState, ...]
+    ramps: tuple[Ramp | None, ...]
+
+
+def change_to(chains: Chains, before: list[Held], after: list[Held]) -> Change:
+    """The change from what chains hold to what they are to hold."""
+    device = chains.device
+    if device.coupling.scope == "device" and device.chain_length > 1:
+        after = _one_lam(chains, after)
+    states = [chains.state(held) for held in after]
+    if device.drive == "device":
+        states = _one_drive(states)
+    if any(state.outcome is not Outcome.OK for state in states):
+        # What cannot be held is not played: no ways are looked for.
+        return Change(after, tuple(states), (None,) * len(states))
+    moves = _moves(chains, before, after)
+    chains.prepare(list(zip(before, after, strict=True)), moves)
+    # Where lam is common, all waves begin to rise together.
+    common = device.coupling.scope == "device" and any(map(chains.waving, after))
+    wait_s = max((chains.leaving_s(one, moves) for one in before), default=0.0) if common and before != after else 0.0
+    ramps = [chains.ramp(one, other, moves, wait_s) for one, other in zip(before, after, strict=True)]
+    if device.coupling.scope == "device" and device.chain_length > 1:
+        return _all_alike(chains, before, Change(after, tuple(states), tuple(ramps)), moves)
+    return Change(after, tuple(states), tuple(ramps))
+
+
+def _moves(chains: Chains, before: list[Held], after: list[Held]) -> bool:
+    """Whether lam may differ on the way from what it is at the ends: one lam for all only if all go one way."""
+    scope = chains.device.coupling.scope
+    if scope != "device":
+        return scope in ("chain", "link")
+    ends = zip(map(chains.waving, before), map(chains.waving, after), strict=True)
+    return len({way for way in ends if way != (b"", b"")}) <= 1
+
+
+def _one_lam(chains: Chains, after: list[Held]) -> list[Held]:
+    """Wishes planned again under the lam of the first chain that is driven, where theirs differ."""
+    driven = [state.lam[0] for state in map(chains.state, after) if state.moving]
+    if len(set(driven)) < 2:
+        return after
+    return [chains.under(held, float(driven[0])) for held in after]
+
+
+def _one_drive(states: list[ChainState]) -> list[ChainState]:
+    """States as they are when all chains are driven like most of those that are driven."""
+    driven = [(state.epsilon, state.omega) for state in states if state.moving]
+    if not driven or (len(driven) == len(states) and len(set(driven)) == 1):
+        return states
+    ((common, _),) = Counter(driven).most_common(1)
+    model = next(state for state in states if (state.epsilon, state.omega) == common)
+    return [_driven_like(state, model) for state in states]
+
+
+def _driven_like(state: ChainState, model: ChainState) -> ChainState:
+    scale = float(np.abs(model.phasor).max()) / max(float(model.target.max()), 1e-12)
+    reached = np.abs(model.phasor) / scale
+    away = np.abs(reached - state.target)
+    if state.phase is not None:
+        there = state.target * np.exp(1j * np.nan_to_num(state.phase))
+        away = np.where(np.isnan(state.phase), away, np.abs(model.phasor / scale - there))
+    return replace(
+        model, target=state.target, phase=state.phase, error=float(away.max()), outcome=Outcome.UNREACHABLE,
+        lacking="one drive is common to all chains, so they move alike; it lacks a drive per chain",
+    )  # fmt: skip
+
+
+def _all_alike(chains: Chains, before: list[Held], change: Change, moves: bool) -> Change:
+    """Every chain under the one lam, resting ones too, on the way and after it."""
+    old = [chains.state(held) for held in before]
+    moving = [state for state in change.states if state.moving]
+    still = [state for state in change.states if np.any(state.bias)]
+    lams = {float(state.lam[0]) for state in (*moving, *still)}
+    if len(lams) > 1:
+        lacking = "one lam is common to all chains, and these take different ones; it lacks a lam per chain"
+        states = tuple(
+            replace(state, outcome=Outcome.UNREACHABLE, lacking=state.lacking or lacking) for state in change.states
+        )
+        return replace(change, states=states)
+    states = change.states
+    if lams:
+        lam = np.full(chains.device.chain_length - 1, lams.pop())
+        idle = [not state.moving and not np.any(state.bias) for state in states]
+        states = tuple(replace(state, lam=lam) if rests else state for state, rests in zip(states, idle, strict=True))
+    changed = {float(state.lam[0]) for state in old if state.moving or np.any(state.bias)} | {
+        float(state.lam[0]) for state in states if state.moving or np.any(state.bias)
+    }
+    ramps = change.ramps
+    if not moves and len(changed) > 1:
+        lacking = "one lam is common to all chains, and they go different ways; it lacks a lam per chain"
+        ramps = tuple(None if ramp is None else replace(ramp, lacking=ramp.lacking or lacking) for ramp in ramps)
+    model = next((ramp for ramp in ramps if ramp is not None and ramp.lam is not None), None)
+    if model is not None and moves:
+        along = Ramp(t_s=model.t_s, lam_t_s=model.lam_t_s, lam=model.lam)
+        ramps = tuple(along if ramp is None else ramp for ramp in ramps)
+    return replace(change, states=states, ramps=ramps)

@@ -1,0 +1,3 @@
+"""Actuators fitted to what was measured of them."""
+
+__all__: list[str] = []

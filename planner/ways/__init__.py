@@ -1,3 +1,0 @@
-"""From one pattern to the next."""
-
-__all__: list[str] = []
