@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import select
 import sys
 from pathlib import Path
 
-from .errors import DriverError
+from .errors import DriverError, FileError
 from .files import naming
 
 __all__ = ["PtyLine", "PtyUnavailable"]
 
 MOST_PENDING = 1 << 20
+# Names of pseudo-terminals on Linux and the BSDs, and on macOS.
+PTY = re.compile(r"/dev/(pts/|ttys)\d+")
 
 
 class PtyUnavailable(DriverError, OSError):
@@ -29,7 +32,8 @@ class PtyLine:
 
     Parameters
     ----------
-    link : a symbolic link to make to it, so that its name stays the same after `unplug`.
+    link : a symbolic link to make to it, so that its name stays the same after `unplug`. One that a dead emulator left
+        there is replaced, anything else is not.
 
     Raises
     ------
@@ -57,24 +61,21 @@ class PtyLine:
         # a host that goes away does not end the line.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.name = os.ttyname(self._slave)
+        self.name = self._pty = os.ttyname(self._slave)
         if self._link is not None:
-            with naming(self._link):
-                aside = self._link.with_name(f".{self._link.name}.{os.getpid()}.part")
-                aside.unlink(missing_ok=True)
-                aside.symlink_to(self.name)
-                aside.replace(self._link)
+            try:
+                _make_link(self._link, self._pty)
+            except BaseException:
+                self._hang_up()
+                raise
             self.name = str(self._link)
 
     def unplug(self) -> None:
         """As if the cable were pulled: the host's next read or write fails."""
-        for number in (self._master, self._slave):
-            if number >= 0:
-                os.close(number)
-        self._master = self._slave = -1
-        self._pending.clear()
-        if self._link is not None:
+        # While the pty is ours, a link to it is ours too.
+        if self._link is not None and self.plugged and _target(self._link) == self._pty:
             self._link.unlink(missing_ok=True)
+        self._hang_up()
 
     @property
     def plugged(self) -> bool:
@@ -97,6 +98,13 @@ class PtyLine:
         """Take the pty and its link away."""
         self.unplug()
 
+    def _hang_up(self) -> None:
+        for number in (self._master, self._slave):
+            if number >= 0:
+                os.close(number)
+        self._master = self._slave = -1
+        self._pending.clear()
+
     def _write(self) -> None:
         try:
             while self._pending:
@@ -115,3 +123,28 @@ class PtyLine:
             if error.errno != errno.EIO:
                 raise
         return bytes(data)
+
+
+def _make_link(link: Path, pty: str) -> None:
+    """Make `link` to `pty`, in the place of a link that an emulator left when it died, and of nothing else.
+
+    Such a link leads to a pty that is gone, or whose number is ours now.
+    """
+    target = _target(link)
+    ours = target is not None and PTY.fullmatch(target) is not None
+    with naming(link):
+        if ours and (target == pty or not os.path.lexists(str(target))):
+            link.unlink(missing_ok=True)
+        try:
+            link.symlink_to(pty)
+        except FileExistsError:
+            there = "the port of a terminal in use" if ours else "not a port that dotwave made"
+            raise FileError(f"{link}: this is {there}; move it away, or give --link another name") from None
+
+
+def _target(link: Path) -> str | None:
+    """Where a symbolic link leads; None when it is none, or not there."""
+    try:
+        return os.readlink(link)
+    except OSError:
+        return None
