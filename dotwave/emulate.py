@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -43,6 +43,7 @@ class EmulateReport:
             "device": self.device, "port": self.port, "state": status.state.name.lower(),
             "played_s": status.played_s, "held_s": status.held_s, "underruns": status.underruns, "bad": status.bad,
             "mischief": status.mischief, "slipped_s": status.slipped_s, "recorded": status.recorded,
+            "cut_short": None if status.cut_short is None else asdict(status.cut_short),
             "record": self.record, "levels": status.levels.tolist(),
         }  # fmt: skip
 
@@ -54,7 +55,11 @@ class EmulateReport:
             f"  {status.underruns} underruns, {status.held_s:.2f} s held, {status.bad} broken packets, "
             f"{status.mischief} spoiled on purpose, {status.slipped_s:.2f} s left out (busy machine)",
         ]
-        if status.recorded:
+        cut = status.cut_short
+        if cut is not None:
+            kept = "" if cut.arrived_s else "; it left no record"
+            lines.append(f"  cut short: {cut.arrived_s:.2f} of {cut.total_s:.2f} s arrived{kept}")
+        if status.recorded or (cut is not None and cut.arrived_s):
             lines.append(f"  what arrived: {self.record}; try `dotwave verify {self.record}`")
         return "\n".join(lines)
 

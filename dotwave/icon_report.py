@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers import atomic_paths
+from drivers import atomic_files, naming
 from encoders import distinctness
 
 from .icon_set import Icon, felt_set
@@ -178,9 +178,10 @@ def write_report(report: IconsReport, out: Path, *, pictures: bool) -> IconsRepo
 
 def _written(out: Path, files: Mapping[str, bytes]) -> tuple[str, ...]:
     paths = [out / name for name in files]
-    with atomic_paths(*paths) as asides:
-        for aside, data in zip(asides, files.values(), strict=True):
-            aside.write_bytes(data)
+    with atomic_files(*paths) as opened:
+        for path, file, data in zip(paths, opened, files.values(), strict=True):
+            with naming(path):
+                file.write(data)
     return tuple(map(str, paths))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers import Encoding, atomic_paths, naming
+from drivers import Encoding, atomic_files, naming
 from planner import DEFAULT_CONTRAST_DB
 
 from .icon_journal import Journal
@@ -153,9 +153,9 @@ class IconRun:
         path = self.out / "waveforms" / f"{name}.wav"
         with naming(path.parent):
             path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_paths(path, path.with_suffix(".json")) as (wav, manifest):
-            wav.write_bytes(record["wav"])
-            manifest.write_bytes(record["json"])
+        with atomic_files(path, path.with_suffix(".json")) as (wav, manifest), naming(path):
+            wav.write(record["wav"])
+            manifest.write(record["json"])
         self.waves[name] = path.relative_to(self.out).as_posix()
         self.journal.add({"key": f"wave:{name}", "made": record["key"], "file": self.waves[name]})
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from chainsim import load_device
-from drivers import atomic_path, naming
+from drivers import atomic_file, naming
 from encoders import (
     Fit,
     GridShape,
@@ -99,7 +99,7 @@ def _explained(files: Sequence[Path], shape: GridShape, options: PictureOptions,
             # Small steps are enlarged so that single points can be seen.
             times = max(1, SHORTEST_SIDE // max(pixels.shape[:2]))
             large = np.repeat(np.repeat(pixels, times, axis=0), times, axis=1)
-            with atomic_path(path) as aside:
-                Image.fromarray(large).save(aside, "PNG")
+            with atomic_file(path) as out, naming(path):
+                Image.fromarray(large).save(out, "PNG")
             written.append(str(path))
     return tuple(written)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any, BinaryIO
 
 from PIL import Image, ImageDraw
 
-from drivers import atomic_path
+from drivers import atomic_files, naming
 
 from .card import CardShape, draw_card, draw_disc
 from .errors import AppError
@@ -56,26 +55,31 @@ def write_preview(report: VerifyReport, start: Path) -> Preview:
     Raises
     ------
     AppError
-        When there is no frame to draw, or the disk refuses.
+        When there is no frame to draw.
     drivers.FileError
-        When a file cannot be made in its folder.
+        When the disk refuses.
     """
     if not report.frames:
         raise AppError(f"{report.path}: has no frames to draw; render it again")
-    files, notes = [], []
+    notes = []
     with progress("drawing") as update:
         cards = _Cards(report, update)
         pages = _pages(cards.shape, len(report.frames))
-        for number, page in enumerate(pages, 1):
-            name = _suffixed(start, ".png" if number == 1 else f"-{number}.png")
-            files.append(_write(name, partial(_sheet(cards, page).save, format="PNG")))
-        files.append(_write(_suffixed(start, ".gif"), partial(_animate, cards)))
+        writers = {
+            _suffixed(start, ".png" if number == 1 else f"-{number}.png"): partial(_paint, cards, page)
+            for number, page in enumerate(pages, 1)
+        }
+        writers[_suffixed(start, ".gif")] = partial(_animate, cards)
+        writers[_suffixed(start, ".txt")] = partial(_spell, report)
+        with atomic_files(*writers) as files:
+            for (path, write), file in zip(writers.items(), files, strict=True):
+                with naming(path):
+                    write(file)
     if len(pages) > 1:
         notes.append(f"The frames fill {len(pages)} pictures of at most {len(pages[0])} each.")
     if len(report.frames) > FRAMES_IN_ANIMATION:
         notes.append(f"The animation shows the first {FRAMES_IN_ANIMATION} frames.")
-    files.append(_write(_suffixed(start, ".txt"), partial(_spell, report)))
-    return Preview(len(report.frames), tuple(files), tuple(notes))
+    return Preview(len(report.frames), tuple(map(str, writers)), tuple(notes))
 
 
 class _Cards:
@@ -97,21 +101,14 @@ def _suffixed(start: Path, end: str) -> Path:
     return start.with_name(start.name + end)
 
 
-def _write(path: Path, write: Callable[[BinaryIO], object]) -> str:
-    """Write a file that is there whole or not at all."""
-    with atomic_path(path) as aside:
-        try:
-            with aside.open("wb") as file:
-                write(file)
-        except OSError as error:
-            raise AppError(f"{path}: {error.strerror or error}; choose another place with --output") from None
-    return str(path)
-
-
 def _pages(shape: CardShape, frames: int) -> list[range]:
     width, height = shape.size
     most = max(1, min(FRAMES_PER_PICTURE, PIXELS_PER_PICTURE // (width * height)))
     return [range(first, min(first + most, frames)) for first in range(0, frames, most)]
+
+
+def _paint(cards: _Cards, page: range, file: BinaryIO) -> None:
+    _sheet(cards, page).save(file, "PNG")
 
 
 def _sheet(cards: _Cards, page: range) -> Image.Image:

@@ -2,41 +2,88 @@
 
 from __future__ import annotations
 
+import hashlib
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["WRITERS", "Parts"]
+from drivers import atomic_file
+
+from .errors import AppError
+
+__all__ = ["WRITERS", "Arrays", "Parts"]
+
+Arrays = dict[str, NDArray[Any]]
 
 # The oldest date a ZIP can hold: same input, same bytes.
 EPOCH = (1980, 1, 1, 0, 0, 0)
+# What zipfile and numpy say of a file that is not what they wrote.
+DAMAGE = (
+    zipfile.BadZipFile, zlib.error, struct.error, KeyError, ValueError, TypeError, EOFError, NotImplementedError,
+    RuntimeError, MemoryError,
+)  # fmt: skip
+DIGEST = "digest"
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Chunks of a sweep in `folder`; `firsts` are the numbers of their first settings."""
+    """Chunks of the sweep `sweep` (its digest) in `folder`; `firsts` are the numbers of their first settings."""
 
     folder: Path
     firsts: range
+    sweep: str = ""
 
     def path(self, first: int) -> Path:
         """Where the chunk that starts at `first` lies."""
         return self.folder / f"{first:012d}.npz"
 
+    def save(self, first: int, arrays: Arrays) -> None:
+        """Keep the chunk that starts at `first`, with a digest of it."""
+        with atomic_file(self.path(first)) as file:
+            np.savez(file, allow_pickle=False, **arrays, **{DIGEST: np.array(self._digest(first, arrays))})
+
+    def done(self, first: int) -> bool:
+        """Whether the chunk that starts at `first` is there as it was kept; one that is damaged is not."""
+        try:
+            with zipfile.ZipFile(self.path(first)) as archive:
+                arrays = {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}
+            return str(arrays.pop(DIGEST)) == self._digest(first, arrays)
+        except (FileNotFoundError, *DAMAGE):
+            return False
+
     def field(self, name: str) -> Iterator[NDArray[Any]]:
         """One field, chunk by chunk."""
         for first in self.firsts:
-            with np.load(self.path(first), allow_pickle=False) as stored:
-                yield stored[name]
+            try:
+                with zipfile.ZipFile(self.path(first)) as archive:
+                    array = _array(archive, f"{name}.npy")
+            except DAMAGE:
+                raise AppError(f"{self.path(first)}: damaged; the same call again solves it anew") from None
+            yield array
+
+    def _digest(self, first: int, arrays: Arrays) -> str:
+        digest = hashlib.sha256(f"{self.sweep} {first}".encode())
+        for name, array in arrays.items():
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
 
 
-def _write_npz(path: Path, parts: Parts, fields: tuple[str, ...], size: int) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    with archive.open(name) as member:
+        array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
+    return array
+
+
+def _write_npz(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int) -> None:
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name in fields:
             info = zipfile.ZipInfo(f"{name}.npy", EPOCH)
             with archive.open(info, "w", force_zip64=True) as stream:
@@ -50,15 +97,16 @@ def _write_npz(path: Path, parts: Parts, fields: tuple[str, ...], size: int) -> 
                     stream.write(np.ascontiguousarray(array).data.cast("B"))
 
 
-def _write_csv(path: Path, parts: Parts, fields: tuple[str, ...], size: int) -> None:
+def _write_csv(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int) -> None:
     """A line for each setting; numbers as short as they can be read back exactly, what is not known as nothing."""
-    with path.open("w", encoding="utf-8", newline="\n") as stream:
-        for number, chunk in enumerate(zip(*(parts.field(name) for name in fields), strict=True)):
-            named = [column for name, array in zip(fields, chunk, strict=True) for column in _columns(name, array)]
-            if not number:
-                stream.write(",".join(name for name, _ in named) + "\n")
-            texts = [_texts(column) for _, column in named]
-            stream.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
+    stream = TextIOWrapper(file, encoding="utf-8", newline="\n")
+    for number, chunk in enumerate(zip(*(parts.field(name) for name in fields), strict=True)):
+        named = [column for name, array in zip(fields, chunk, strict=True) for column in _columns(name, array)]
+        if not number:
+            stream.write(",".join(name for name, _ in named) + "\n")
+        texts = [_texts(column) for _, column in named]
+        stream.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
+    stream.detach()
 
 
 def _columns(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -81,5 +129,5 @@ def _texts(column: NDArray[Any]) -> list[str]:
     return [str(value) for value in column.tolist()]
 
 
-WRITERS: dict[str, Callable[[Path, Parts, tuple[str, ...], int], None]] = {".npz": _write_npz, ".csv": _write_csv}
-"""How to join the parts of a sweep, by suffix."""
+WRITERS: dict[str, Callable[[BinaryIO, Parts, tuple[str, ...], int], None]] = {".npz": _write_npz, ".csv": _write_csv}
+"""How to join the parts of a sweep into an open file, by suffix."""

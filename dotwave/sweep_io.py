@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-import shutil
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -23,7 +20,7 @@ from .progress import progress
 if TYPE_CHECKING:
     from chainsim import SettingSweep
 
-    from .sweep_files import Parts
+    from .sweep_files import Arrays, Parts
 
 __all__ = ["FIELDS", "SweepReport", "run_sweep"]
 
@@ -36,7 +33,6 @@ FIELDS = (
 SCHEMA = "dotwave/sweep/1"
 # Units of `chainsim.unit_of` in a chunk: 65,536 settings of a short chain.
 UNITS = 16
-Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,8 @@ def run_sweep(
 ) -> SweepReport:
     """Solve every setting of the sweep file `source` and write `out` (.npz or .csv).
 
-    Chunks that are done lie in the folder ``OUT.parts`` until the end: the same call goes on where it was stopped.
+    Chunks that are done lie in the folder ``OUT.parts`` until the end: the same call goes on where it was stopped. One
+    that was damaged there is solved again.
     Memory holds one chunk a worker. The file does not depend on `workers` or `units` in any bit.
 
     Parameters
@@ -83,14 +80,15 @@ def run_sweep(
     Raises
     ------
     AppError
-        When `out` cannot be written, names no known format, or its parts belong to another sweep.
+        When `out` cannot be written or names no known format, or the folder of its parts is not this sweep's.
     chainsim.ChainError
         When the sweep file does not fit.
     """
     from chainsim import read_sweep, unit_of
-    from drivers import atomic_path
+    from drivers import FileError, atomic_file
 
     from .sweep_files import WRITERS, Parts
+    from .sweep_parts import claimed, removed
 
     began = time.perf_counter()
     unknown = [name for name in only if name not in FIELDS]
@@ -102,35 +100,30 @@ def run_sweep(
         raise AppError(f"workers, units: expected 1 or more, got {workers}, {units}")
     sweep = read_sweep(source)
     chunk = units * unit_of(sweep.chain.n)
-    parts = out.with_name(out.name + ".parts")
     fields = tuple(name for name in FIELDS if name in only)
+    note = _note(sweep, fields, chunk)
+    stored = Parts(out.with_name(out.name + ".parts"), range(0, len(sweep), chunk), note["sweep"])
     try:
-        _claim(parts, sweep, fields, chunk)
-        stored = Parts(parts, range(0, len(sweep), chunk))
-        todo = [first for first in stored.firsts if not stored.path(first).exists()]
-        _solve_all(source, stored, todo, chunk, fields, workers, sweep)
-        counts = _counted(stored)
-        with atomic_path(out) as aside:
-            WRITERS[out.suffix.lower()](aside, stored, fields, len(sweep))
-        shutil.rmtree(parts)
+        with claimed(stored.folder, note):
+            todo = [first for first in stored.firsts if not stored.done(first)]
+            _solve_all(source, stored, todo, chunk, fields, workers, sweep)
+            counts = _counted(stored)
+            with atomic_file(out) as file:
+                WRITERS[out.suffix.lower()](file, stored, fields, len(sweep))
+            removed(stored.folder, stored.firsts)
+    except FileError:
+        raise
     except OSError as error:
-        raise AppError(f"{error.filename or out}: {error.strerror or error}") from None
+        raise AppError(f"{out}: {error.strerror or error}") from None
     return SweepReport(out, len(sweep), counts, len(stored.firsts) - len(todo), time.perf_counter() - began)
 
 
-def _claim(parts: Path, sweep: SettingSweep, fields: tuple[str, ...], chunk: int) -> None:
-    """Make the folder of parts, or make sure that it is this sweep's."""
+def _note(sweep: SettingSweep, fields: tuple[str, ...], chunk: int) -> dict[str, Any]:
+    """What tells the parts of this sweep from those of any other."""
     digest = hashlib.sha256(repr((sweep.chain, sweep.tol, sweep.from_rest, sweep.shape)).encode())
     for name, column in [*zip(("epsilon", "lam", "omega"), sweep.columns, strict=True), *sweep.fixed.items()]:
         digest.update(name.encode() + np.ascontiguousarray(column, dtype=np.float64).tobytes())
-    mine = {"schema": SCHEMA, "sweep": digest.hexdigest(), "fields": list(fields), "chunk": chunk}
-    note = parts / "sweep.json"
-    if note.exists():
-        if json.loads(note.read_text(encoding="utf-8")) != mine:
-            raise AppError(f"{parts}: left by another sweep; finish that one, or delete the folder")
-        return
-    parts.mkdir(parents=False, exist_ok=True)
-    _atomically(note, lambda aside: aside.write_text(json.dumps(mine), encoding="utf-8"))
+    return {"schema": SCHEMA, "sweep": digest.hexdigest(), "fields": list(fields), "chunk": chunk}
 
 
 def _solve_all(
@@ -159,7 +152,7 @@ def _solve_in_process(source: Path, stored: Parts, first: int, chunk: int, field
 def _solve_part(sweep: SettingSweep, stored: Parts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
     solved = _answers(sweep, first, first + chunk, fields)
     # The outcome is counted for the report whether or not it is asked for.
-    _atomically(stored.path(first), lambda aside: _save(aside, solved))
+    stored.save(first, solved)
 
 
 def _counted(stored: Parts) -> dict[str, int]:
@@ -168,11 +161,6 @@ def _counted(stored: Parts) -> dict[str, int]:
         for name, count in zip(*np.unique(outcomes, return_counts=True), strict=True):
             counts[str(name)] = counts.get(str(name), 0) + int(count)
     return counts
-
-
-def _save(path: Path, arrays: Arrays) -> None:
-    with path.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **arrays)
 
 
 def _answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]) -> Arrays:
@@ -197,12 +185,3 @@ def _answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]
         "error_estimate": lambda: found.error_estimate,
     }
     return {"outcome": found.outcome_name} | {name: made[name]() for name in fields if name != "outcome"}
-
-
-def _atomically(path: Path, write: Callable[[Path], object]) -> None:
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        write(aside)
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import atomic_file, naming
+
 from .errors import AppError
 
 if TYPE_CHECKING:
@@ -43,6 +45,8 @@ def draw_map(source: Path, solved: Path, picture: Path) -> None:
     ------
     AppError
         When the sweep has not two ranges, or its file lacks one of `NEEDED`.
+    drivers.FileError
+        When `picture` cannot be written.
     """
     from chainsim import read_sweep
 
@@ -113,7 +117,8 @@ def _paint(panels: list[tuple[str, NDArray[np.uint8]]], up: _Axis, right: _Axis,
             pen.text((4, TITLE), f"{up.last:.4g}", fill="black", font_size=10 + height // 100)
             pen.text((4, TITLE + height // 2), up.name, fill="black", font_size=10 + height // 100)
     _legend(pen, height)
-    whole.save(picture, format="PNG", **_FAST)
+    with atomic_file(picture) as file, naming(picture):
+        whole.save(file, format="PNG", **_FAST)
 
 
 def _legend(pen: Any, height: int) -> None:

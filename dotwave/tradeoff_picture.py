@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drivers import atomic_file, naming
+
 if TYPE_CHECKING:
     from planner import ParetoFront, Tradeoff
 
@@ -122,7 +124,9 @@ def _axes(size: tuple[float, float]) -> tuple[Any, Any]:
 
 
 def _save(figure: Any, picture: Path) -> None:
-    picture.parent.mkdir(parents=True, exist_ok=True)
+    with naming(picture.parent):
+        picture.parent.mkdir(parents=True, exist_ok=True)
     # No date in the file: the same numbers give the same bytes.
     still: dict[str, None] = {"Date": None} if picture.suffix.lower() == ".svg" else {"Software": None}
-    figure.savefig(picture, dpi=110, metadata=still)
+    with atomic_file(picture) as file, naming(picture):
+        figure.savefig(file, format=picture.suffix[1:].lower(), dpi=110, metadata=still)

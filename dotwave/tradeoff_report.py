@@ -257,7 +257,4 @@ def pareto_report(pattern: TargetPattern, device: Device, asked: FrameAsked) -> 
 
 def _drawn(picture: Path, draw: Callable[[], None]) -> None:
     picture_name(picture)
-    try:
-        draw()
-    except OSError as error:
-        raise AppError(f"{picture}: cannot be written: {error.strerror or error}") from None
+    draw()

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 from .channels import Channel, Role, channels_of
 from .coupling import CouplingEvent
 from .errors import DriverError, FileError, LimitError, UnreadableWaveform, WaveformError
-from .files import atomic_path, atomic_paths, naming
+from .files import atomic_file, atomic_files, naming, settled
 from .limits import LimitCheck
+from .locks import held
 from .manifest import FrameMark, Manifest
 from .manifest_reader import read_manifest
 from .pair import WrittenWaveform, read_waveform, write_waveform
+from .parts import Part, part_of
 from .samples import EXCHANGE_SUFFIXES, SUFFIXES, SampleReader, SampleWriter
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
@@ -77,6 +79,7 @@ __all__ = [
     "NoAnswer",
     "Packet",
     "PacketReader",
+    "Part",
     "PortUnavailable",
     "PtyUnavailable",
     "Role",
@@ -96,12 +99,14 @@ __all__ = [
     "WaveformError",
     "Window",
     "WrittenWaveform",
-    "atomic_path",
-    "atomic_paths",
+    "atomic_file",
+    "atomic_files",
     "channels_of",
     "grid_line",
+    "held",
     "naming",
     "parse_outputs",
+    "part_of",
     "pass_gate",
     "plan_board",
     "play_audio",
@@ -112,6 +117,7 @@ __all__ = [
     "run_session",
     "serial_ports",
     "session_messages",
+    "settled",
     "write_exchange",
     "write_waveform",
 ]

@@ -18,7 +18,7 @@ from .felt import FeltGrid
 from .messages import State
 from .playout import ControllerSpec, OutputBlock
 from .pty_line import PtyLine
-from .record import ArrivalRecorder
+from .record import ArrivalRecorder, CutShort
 
 __all__ = ["Emulator", "EmulatorStatus"]
 
@@ -35,7 +35,8 @@ class EmulatorStatus:
     session : of the host, 0 for none. played_s, stored_s : of the stream. peak_volts : of the last step.
     levels : float64, shape (rows, cols), what is felt in units of full scale.
     bad : frames that were no packet. mischief : packets dropped, corrupted or duplicated on purpose.
-    slipped_s : time left out because the machine was busy. recorded : sessions written.
+    slipped_s : time left out because the machine was busy. recorded : complete sessions written.
+    cut_short : the last session that began, when a recorder saw it cut short.
     """
 
     state: State
@@ -51,6 +52,7 @@ class EmulatorStatus:
     mischief: int
     slipped_s: float
     recorded: int
+    cut_short: CutShort | None
 
 
 class Emulator:
@@ -130,6 +132,8 @@ class Emulator:
             self._make_lines()
         self._there.put(data, self._now)
         self.controller.receive(self._there.take(self._now), self._now)
+        if self._recorder is not None and self.controller.playout.state is State.STOPPED:
+            self._recorder.cut()
 
     def status(self) -> EmulatorStatus:
         """What there is to see now."""
@@ -142,13 +146,14 @@ class Emulator:
             bad=self.controller.bad,
             mischief=sum(line.dropped + line.corrupted + line.duplicated for line in lines),
             slipped_s=self._slipped, recorded=self._recorder.finished if self._recorder is not None else 0,
+            cut_short=self._recorder.cut_short if self._recorder is not None else None,
         )  # fmt: skip
 
     def close(self) -> None:
-        """Take the port away and drop an unfinished record."""
+        """Take the port away and keep what arrived of a session under way."""
         self._line.close()
         if self._recorder is not None:
-            self._recorder.close()
+            self._recorder.cut()
 
     def _make_lines(self) -> None:
         faults = replace(self._faults, disconnect=None)

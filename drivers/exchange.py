@@ -15,7 +15,7 @@ from planner import Plan
 
 from .ahap import read_ahap, to_ahap
 from .errors import FileError, UnreadableWaveform
-from .files import atomic_path, naming
+from .files import atomic_file, naming
 from .haptic_curves import HapticCurves, haptic_curves
 from .hjif import read_hjif, to_hjif
 from .meta_haptic import read_meta, to_meta
@@ -43,8 +43,9 @@ def write_exchange(plan: Plan, path: Path | str, *, actuator: tuple[int, int] | 
     curves = haptic_curves(plan)
     single = to_ahap if suffix == ".ahap" else to_meta
     content = to_hjif(curves, plan) if suffix == ".hjif" else single(curves.of(actuator))
-    with atomic_path(path) as aside, naming(path):
-        aside.write_text(json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n", "utf-8")
+    text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+    with atomic_file(path) as file, naming(path):
+        file.write(text.encode())
 
 
 def read_exchange(path: Path | str) -> HapticCurves:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterator
+import secrets
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO
 
 from .errors import FileError
+from .parts import Belongs, Part, finish, make, settle, sync_folder
 
-__all__ = ["atomic_path", "atomic_paths", "naming", "opened"]
+__all__ = ["atomic_file", "atomic_files", "naming", "settled"]
+
+NOT_A_FILE = "this is a device or a pipe; give the name of a file"
 
 
 @contextmanager
@@ -26,68 +32,130 @@ def naming(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
-    """One file of `atomic_paths`; gives the path to write to."""
-    with atomic_paths(path) as (aside,):
-        yield aside
+def atomic_file(path: Path) -> Iterator[BinaryIO]:
+    """One file of `atomic_files`."""
+    with atomic_files(path) as (file,):
+        yield file
 
 
 @contextmanager
-def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Write files aside, in the folders where they belong; put them in place together when the body ends well.
+def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple[BinaryIO, ...]]:
+    """Write files of one folder aside; put them in place together when the body ends well.
 
-    Gives empty files to write to. At the end all are flushed to the disk, then renamed in the given order, so
-    that the last one's presence says that all are whole. Whatever stops the body (an error, Ctrl-C), nothing
-    new is left.
+    Gives empty files, open for writing and reading; they are closed at the end. Then all are flushed to the disk and
+    get their names in the given order. Whatever stops the body, an error, Ctrl-C or SIGKILL, the files of these names
+    are all the old ones or all the new ones; what a killed writer leaves half done is settled by the next one, or by
+    `settled`.
+
+    Parameters
+    ----------
+    belongs : which other files a killed writer may have written together with one of these, by name; only these
+        themselves unless given.
 
     Raises
     ------
     FileError
         Before the body when a file cannot be made there; after it when it cannot be put in place.
     """
-    asides = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
-    made: list[Path] = []
+    folder, token = paths[0].parent, secrets.token_hex(8)
+    parts = [Part(path, token) for path in paths]
+    files: list[BinaryIO] = []
+    _tidy(paths, belongs or {path.name for path in paths}.__contains__)
     try:
-        for path, aside in zip(paths, asides, strict=True):
-            with naming(path):
-                if path.is_dir():
-                    raise IsADirectoryError(errno.EISDIR, "is a folder")
-                made.append(aside)
-                aside.open("wb").close()
-        yield asides
-        for path, aside in zip(paths, asides, strict=True):
-            with naming(path):
-                _flush(aside)
-        for path, aside in zip(paths, asides, strict=True):
-            with naming(path):
-                aside.replace(path)
-                made[made.index(aside)] = path
-        made.clear()
+        try:
+            for part in parts:
+                with naming(part.path):
+                    _check_target(part.path)
+                    files.append(make(part))
+            began = _changed(folder)
+            yield tuple(files)
+            alone = _changed(folder) == began
+            _make_count(parts, files)
+        finally:
+            _finish(parts)
     finally:
-        for leftover in made:
+        for file in files:
+            # Closing flushes what is left of a write that came to nothing: on a full disk that fails again.
             with suppress(OSError):
-                leftover.unlink()
+                file.close()
+    _remember(folder, alone)
 
 
-@contextmanager
-def opened(aside: Path, path: Path) -> Iterator[BinaryIO]:
-    """The file `aside` open for writing; opening and closing it complain about `path`, which it will become."""
-    with naming(path):
-        file = aside.open("wb")
+def settled(path: Path, belongs: Belongs) -> None:
+    """Before reading: finish or undo what a killed writer left of `path` and the files that belong to it.
+
+    Where that cannot be done, such as on a read-only file system, everything stays as it is.
+    """
+    with suppress(OSError):
+        settle(path.parent, belongs, others=False)
+
+
+def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
+    """Bring all files to the disk, then do the one rename that makes them count."""
+    for part, file in zip(parts, files, strict=True):
+        with naming(part.path):
+            file.flush()
+            os.fsync(file.fileno())
+            _check_target(part.path)
+            if sys.platform == "win32":
+                file.close()  # Windows renames no open file
+    last = parts[-1]
+    with naming(last.path):
+        os.replace(last.part, last.ready if len(parts) > 1 else last.path)
+    sync_folder(last.path.parent)
+
+
+def _finish(parts: Sequence[Part]) -> None:
     try:
-        yield file
-    except BaseException:
-        # Closing flushes what is left: on a full disk that fails again and would hide the first error.
-        with suppress(OSError):
-            file.close()
-        raise
-    with naming(path):
-        file.close()
+        finish(parts)
+    except OSError as error:
+        if os.path.lexists(parts[0].part):
+            # Not even the first has got its name, so all the old ones are still there.
+            with suppress(OSError):
+                os.replace(parts[-1].ready, parts[-1].part)
+                finish(parts)
+        refused = Path(error.filename2 or parts[-1].path)
+        raise FileError(f"{refused}: {_complaint(refused, error)}") from None
 
 
-def _flush(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
+def _check_target(path: Path) -> None:
+    with suppress(FileNotFoundError):
+        mode = path.stat().st_mode
+        if S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, "is a folder")
+        if not S_ISREG(mode):
+            raise OSError(errno.EINVAL, NOT_A_FILE)
+
+
+# Folders by their absolute path as this process left them: when they last changed, and names whose writes wait there.
+# What nobody else has changed need not be looked through again: thousands of files in one folder would make that slow.
+_known: dict[str, tuple[int | None, frozenset[str]]] = {}
+
+
+def _tidy(paths: Sequence[Path], belongs: Belongs) -> None:
+    """Settle what dead processes left of these files, and delete what else they left in the folder."""
+    folder = paths[0].parent
+    if any(path.parent != folder for path in paths):
+        raise ValueError(f"files written together lie in one folder, got {[str(path) for path in paths]}")
+    changed, waiting = _known.get(os.path.abspath(folder), (None, frozenset()))
+    if changed is not None and changed == _changed(folder) and not any(map(belongs, waiting)):
+        return
+    with naming(paths[-1]):
+        waiting = settle(folder, belongs, others=True)
+    _known[os.path.abspath(folder)] = (_changed(folder), waiting)
+
+
+def _remember(folder: Path, alone: bool) -> None:
+    """What this process itself did to the folder is no reason to look through it again."""
+    _, waiting = _known[os.path.abspath(folder)]
+    _known[os.path.abspath(folder)] = (_changed(folder) if alone else None, waiting)
+
+
+def _changed(folder: Path) -> int | None:
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return None
 
 
 def _complaint(path: Path, error: OSError) -> str:
@@ -100,6 +168,7 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.EPERM: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EROFS: f"folder {folder} is on a read-only file system; choose another folder",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
+        errno.EEXIST: "there is a file of this name; choose another",
         errno.EISDIR: "this is a folder; give the name of a file",
     }
     if error.errno == errno.ENOENT:

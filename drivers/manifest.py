@@ -24,7 +24,7 @@ from .coupling import CouplingEvent, CouplingWriter, LamTrack
 from .errors import UnreadableWaveform, WaveformError
 from .files import naming
 
-__all__ = ["SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of"]
+__all__ = ["SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open"]
 
 Floats = NDArray[np.float64]
 
@@ -134,7 +134,22 @@ def digest_of(path: Path) -> str:
         When the file cannot be read.
     """
     with naming(path), path.open("rb") as file:
-        return f"sha256:{hashlib.file_digest(file, 'sha256').hexdigest()}"
+        return digest_of_open(file)
+
+
+def digest_of_open(file: BinaryIO) -> str:
+    """The same of a file that is open for reading; it is left at its end.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    """
+    file.seek(0)
+    digest = hashlib.sha256()
+    for piece in iter(lambda: file.read(1 << 20), b""):
+        digest.update(piece)
+    return f"sha256:{digest.hexdigest()}"
 
 
 class ManifestWriter:

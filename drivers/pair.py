@@ -13,11 +13,12 @@ from planner import FramePlan, Plan
 
 from .channels import channels_of
 from .errors import UnreadableWaveform
-from .files import atomic_paths, naming, opened
+from .files import atomic_files, naming, settled
 from .limits import LimitCheck
-from .manifest import Manifest, ManifestWriter, digest_of
+from .manifest import Manifest, ManifestWriter, digest_of_open
 from .manifest_reader import read_manifest
-from .samples import SampleReader, check_suffix, open_samples, writer_for
+from .parts import Belongs
+from .samples import SUFFIXES, SampleReader, check_suffix, open_samples, writer_for
 from .wav import Encoding
 from .waveform import Waveform
 
@@ -56,8 +57,8 @@ def write_waveform(
 ) -> WrittenWaveform:
     """Carry out `plan` into `path` (.wav, .npz, .csv or .raw) and the manifest beside it (.json).
 
-    Both files appear whole, or neither. The plan's frames are drawn once, and memory does not grow with
-    their number. `progress` is called with the seconds written so far.
+    Both files appear whole, or neither, even when the process is killed (`atomic_files`). The plan's frames are drawn
+    once, and memory does not grow with their number. `progress` is called with the seconds written so far.
 
     Raises
     ------
@@ -72,31 +73,35 @@ def write_waveform(
     check_suffix(path)
     manifest_path = path.with_suffix(".json")
     with (
-        atomic_paths(path, manifest_path) as (aside, manifest_aside),
+        atomic_files(path, manifest_path, belongs=_belongs(path)) as (file, manifest_file),
         ManifestWriter(plan.device, manifest_path) as marks,
     ):
         waveform = Waveform(plan.device, channels_of(plan.device), _marked(plan.frames, marks))
         check = LimitCheck(plan.device.amplifier, waveform.channels)
-        with opened(aside, path) as file:
+        with naming(path):
+            writer = writer_for(path, file, waveform.channels, waveform.rate_hz, encoding)
+        for block in waveform.blocks(BLOCK):
+            check.check(block)
             with naming(path):
-                writer = writer_for(path, file, waveform.channels, waveform.rate_hz, encoding)
-            for block in waveform.blocks(BLOCK):
-                check.check(block)
-                with naming(path):
-                    writer.write(block)
-                if progress is not None:
-                    progress(writer.samples / waveform.rate_hz)
-            with naming(path):
-                writer.finish()
-        digest = digest_of(aside)
-        with opened(manifest_aside, manifest_path) as out, naming(manifest_path):
-            marks.write(out, path.name, writer.samples, digest, plan.encoding)
+                writer.write(block)
+            if progress is not None:
+                progress(writer.samples / waveform.rate_hz)
+        with naming(path):
+            writer.finish()
+            digest = digest_of_open(file)
+        with naming(manifest_path):
+            marks.write(manifest_file, path.name, writer.samples, digest, plan.encoding)
     peak_volts = check.peak_volts.copy()
     peak_volts.flags.writeable = False
     return WrittenWaveform(
         path, manifest_path, marks.frames, writer.samples, writer.samples / waveform.rate_hz, digest,
         peak_volts, check.peak_slew_v_per_s,
     )  # fmt: skip
+
+
+def _belongs(path: Path) -> Belongs:
+    """Names of samples, in any format, and manifest of one waveform."""
+    return lambda name: Path(name).stem == path.stem and Path(name).suffix.lower() in (*SUFFIXES, ".json")
 
 
 def _marked(frames: Iterable[FramePlan], marks: ManifestWriter) -> Iterator[FramePlan]:
@@ -120,6 +125,7 @@ def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     """
     path = Path(path)
     manifest_path = path if path.suffix.lower() == ".json" else path.with_suffix(".json")
+    settled(manifest_path, _belongs(path))
     manifest = read_manifest(manifest_path)
     samples_path = manifest_path.with_name(manifest.samples_file)
     if path != manifest_path and path.name != samples_path.name:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from chainsim import Device
 
 from .channels import channels_of
 from .errors import FileError
-from .files import atomic_paths, naming, opened
-from .manifest import SCHEMA, FrameMark, Manifest, digest_of
+from .files import atomic_files, naming
+from .manifest import SCHEMA, FrameMark, Manifest, digest_of_open
 from .messages import FULL_CODE, Codes, LinkCoupling, Mark, Start
 from .playout import ControllerSpec, Event
 from .wav import WavWriter
 
-__all__ = ["ArrivalRecorder", "frame_note", "scene_note"]
+__all__ = ["ArrivalRecorder", "CutShort", "frame_note", "scene_note"]
 
 MOST_NOTE_BYTES = 1 << 20
 
@@ -50,9 +51,18 @@ def _unpacked(note: bytes) -> dict[str, Any]:
     """The note's object; empty when it is none."""
     try:
         value = json.loads(zlib.decompressobj().decompress(note, MOST_NOTE_BYTES))
+        json.dumps(value, allow_nan=False)
     except (zlib.error, ValueError, RecursionError):
         return {}
     return value if isinstance(value, dict) else {}
+
+
+@dataclass(frozen=True)
+class CutShort:
+    """A session that did not come to its end: seconds of its samples that arrived, and those announced."""
+
+    arrived_s: float
+    total_s: float
 
 
 class ArrivalRecorder:
@@ -60,7 +70,13 @@ class ArrivalRecorder:
 
     A sample is code / 32767 of the channel's volts per unit; float32 gives every code back exactly. Events
     stand at their samples. Frames come from the notes of the marks; a mark without a note has no frame in the
-    record. The files appear when the session's END arrives; a new session writes them anew.
+    record. The files appear when the session's END arrives, or when it is cut short: then they hold the samples that
+    arrived and the frames that stood in them, and the manifest says ``"complete": false``. A new session writes them
+    anew; one of which no sample arrived leaves them as they are.
+
+    Attributes
+    ----------
+    finished : sessions written that were complete. cut_short : the last session, when it was cut short.
 
     Parameters
     ----------
@@ -77,26 +93,28 @@ class ArrivalRecorder:
             raise FileError(f"{path}: expected a name that ends in .wav")
         self._device = device
         self._path = path
+        self._manifest_path = path.with_suffix(".json")
         self._lam_step = ControllerSpec.of(device, buffer_s=1.0).lam_step
         self._stack = ExitStack()
+        self._under_way = False
         self.finished = 0
+        self.cut_short: CutShort | None = None
 
     def start(self, start: Start) -> None:
-        """A session begins; what was unfinished is dropped."""
-        self.close()
+        """A session begins; one that was not finished is cut short."""
+        self.cut()
+        self._total = start.total
         self._note = _unpacked(start.note)
         self._coupling: list[dict[str, Any]] = []
         self._frames: list[dict[str, Any]] = []
-        manifest_path = self._path.with_suffix(".json")
-        self._context = atomic_paths(self._path, manifest_path)
         with ExitStack() as stack:
-            self._aside, self._manifest_aside = stack.enter_context(self._context)
-            self._file = stack.enter_context(opened(self._aside, self._path))
+            self._file, self._manifest_file = stack.enter_context(atomic_files(self._path, self._manifest_path))
             with naming(self._path):
                 self._writer = WavWriter(
                     self._file, channels_of(self._device), self._device.amplifier.rate_hz, "float32"
                 )
             self._stack = stack.pop_all()
+        self._under_way = True
 
     def samples(self, codes: Codes) -> None:
         """Samples, int16, shape (S, channels)."""
@@ -115,32 +133,57 @@ class ArrivalRecorder:
 
     def end(self) -> None:
         """The session is complete: put the files in place."""
-        with self._stack, naming(self._path):
-            self._writer.finish()
+        self._under_way, self.cut_short = False, None
+        self._write(self._frames, {})
+        self.finished += 1
+
+    def cut(self) -> None:
+        """The session goes no further: put in place what arrived of it. Without a session, nothing happens."""
+        if not self._under_way:
+            return
+        rate = self._device.amplifier.rate_hz
+        self._under_way = False
+        self.cut_short = CutShort(self._writer.samples / rate, self._total / rate)
+        if self._writer.samples:
+            stood = (_stood(frame, self.cut_short.arrived_s, self._device) for frame in self._frames)
+            self._write([frame for frame in stood if frame is not None], {"complete": False})
+        else:
+            self._drop()
+
+    def _write(self, frames: list[dict[str, Any]], more: Mapping[str, Any]) -> None:
+        with self._stack:
+            with naming(self._path):
+                self._writer.finish()
+                digest = digest_of_open(self._file)
             manifest = {
                 "schema": SCHEMA,
                 "samples_file": self._path.name,
                 "rate_hz": self._device.amplifier.rate_hz,
                 "samples": self._writer.samples,
-                "digest": digest_of(self._aside),
+                "digest": digest,
                 "device": self._device.as_dict(),
                 "channels": [channel.as_dict() for channel in channels_of(self._device)],
                 "coupling": self._coupling,
-                "frames": self._frames,
+                "frames": frames,
                 "encoding": self._note.get("encoding", {}),
+                **more,
             }
-            self._manifest_aside.write_text(json.dumps(manifest, allow_nan=False), encoding="utf-8")
-        self.finished += 1
+            with naming(self._manifest_path):
+                self._manifest_file.write(json.dumps(manifest, allow_nan=False).encode())
 
-    def close(self) -> None:
-        """Drop what is unfinished."""
-        stack, self._stack = self._stack.pop_all(), ExitStack()
-        try:
-            with stack:
-                raise _Dropped
-        except _Dropped:
-            pass
+    def _drop(self) -> None:
+        with suppress(_Dropped), self._stack:
+            raise _Dropped
 
 
 class _Dropped(Exception):
     """Leaves the unfinished files by the way that removes them."""
+
+
+def _stood(frame: dict[str, Any], arrived_s: float, device: Device) -> dict[str, Any] | None:
+    """The frame as far as it arrived; None when its pattern did not stand for a period of the resonance."""
+    settled_s, end_s = frame.get("settled_s"), frame.get("end_s")
+    if not isinstance(settled_s, int | float) or not isinstance(end_s, int | float):
+        return None
+    stood_s = min(end_s, arrived_s) - settled_s
+    return frame | {"end_s": min(end_s, arrived_s)} if stood_s >= 1 / device.f0_hz else None

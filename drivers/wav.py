@@ -75,7 +75,7 @@ class WavWriter:
         self._unit: Floats = np.array([channel.volts_per_unit for channel in channels])
         self._riff_limit = riff_limit
         self.samples = 0
-        file.write(self._header())
+        self._data_at = file.write(self._header())
 
     def write(self, block: Floats) -> None:
         """Append samples; float64, shape (S, channels), volts.
@@ -92,6 +92,9 @@ class WavWriter:
 
     def finish(self) -> None:
         """Pad the data and write the sizes into the header. The file stays open."""
+        # A write that was interrupted may have left a part of its block.
+        self._file.seek(self._data_at + self._data_bytes)
+        self._file.truncate()
         if self._data_bytes % 2:
             self._file.write(b"\0")
         self._file.seek(0)

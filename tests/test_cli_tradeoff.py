@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from dotwave.asked import seconds_of
 from dotwave.cli_plan import plan_app
 from dotwave.errors import AppError
+from drivers import FileError
 from planner import PlanError
 
 JOB = """\
@@ -102,7 +103,7 @@ def test_complaints(job, tmp_path):
     with pytest.raises(AppError, match=r"expected a picture name that ends with .png or .svg"):
         run("pareto", job, "--picture", tmp_path / "ways.gif")
     (tmp_path / "file").write_text("")
-    with pytest.raises(AppError, match="cannot be written"):
+    with pytest.raises(FileError, match="file: there is a file of this name; choose another"):
         run("pareto", job, "--picture", tmp_path / "file" / "ways.png")
     with pytest.raises(AppError, match="no frame 7"):
         run("pareto", job, "--frame", "7")

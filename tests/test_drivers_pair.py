@@ -29,8 +29,8 @@ from drivers import (
     Waveform,
     WaveformError,
     WavWriter,
-    atomic_path,
-    atomic_paths,
+    atomic_file,
+    atomic_files,
     read_manifest,
     read_waveform,
     write_waveform,
@@ -376,7 +376,7 @@ def test_a_read_only_folder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise OSError(number, os.strerror(number))
 
     plan = plan_of("linked-6x6")
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(FileError, match=words):
         write_waveform(plan, tmp_path / "x.wav")
     assert list(tmp_path.iterdir()) == []
@@ -395,23 +395,24 @@ def test_an_error_of_the_planner_is_not_blamed_on_the_output(tmp_path: Path) -> 
 
 def test_atomic_files_are_out_of_sight_until_all_are_done(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
-    with atomic_paths(one, two) as (a, b):
-        a.write_bytes(b"1")
-        b.write_bytes(b"2")
-        assert a.name == f".one.{os.getpid()}.part"
+    with atomic_files(one, two) as (a, b):
+        a.write(b"1")
+        b.write(b"2")
         assert not one.exists()
         assert not two.exists()
     assert (one.read_bytes(), two.read_bytes()) == (b"1", b"2")
-    with atomic_path(one) as aside:
-        aside.write_bytes(b"3")
+    with atomic_file(one) as a:
+        a.write(b"3")
     assert one.read_bytes() == b"3"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
 
 
-def test_when_the_second_cannot_be_put_in_place_the_first_is_taken_back(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="two"), atomic_paths(tmp_path / "one", tmp_path / "two"):
+def test_when_the_second_cannot_be_put_in_place_the_first_is_not_either(tmp_path: Path) -> None:
+    (tmp_path / "one").write_bytes(b"old")
+    with pytest.raises(FileError, match="two"), atomic_files(tmp_path / "one", tmp_path / "two"):
         (tmp_path / "two").mkdir()
-    assert [p.name for p in tmp_path.iterdir()] == ["two"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
+    assert (tmp_path / "one").read_bytes() == b"old"
 
 
 def test_an_encoding_that_is_not_json_is_refused(tmp_path: Path) -> None:
