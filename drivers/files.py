@@ -13,10 +13,11 @@ from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO
 
 from .errors import FileError
-from .parts import Belongs, Part, finish, make, settle, sync_folder
+from .parts import Belongs, Part, finish, is_at, make, settle, sync_folder
 
 __all__ = ["atomic_file", "atomic_files", "naming", "settled"]
 
+TAKEN_AWAY = "another program took away what was written so far; write it again, or in a folder of your own"
 NOT_A_FILE = "this is a device or a pipe; give the name of a file"
 
 
@@ -97,6 +98,8 @@ def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
             file.flush()
             os.fsync(file.fileno())
             _check_target(part.path)
+            if not is_at(part.part, file.fileno()):
+                raise OSError(errno.ESTALE, TAKEN_AWAY)
             if sys.platform == "win32":
                 file.close()  # Windows renames no open file
     last = parts[-1]

@@ -22,7 +22,7 @@ from typing import BinaryIO
 
 from .locks import held
 
-__all__ = ["Belongs", "Part", "finish", "make", "part_of", "settle", "sync_folder"]
+__all__ = ["Belongs", "Part", "finish", "is_at", "make", "part_of", "settle", "sync_folder"]
 
 Belongs = Callable[[str], bool]
 """Whether a file of this name may be put in place."""
@@ -66,7 +66,7 @@ def make(part: Part) -> BinaryIO:
     while True:
         file = os.fdopen(os.open(part.part, NEW, 0o666), "w+b")
         # Between its making and its lock it looked like one of a dead writer.
-        if held(file.fileno()) is not False and _is_at(part.part, file.fileno()):
+        if held(file.fileno()) is not False and is_at(part.part, file.fileno()):
             return file
         file.close()
         part.part.unlink(missing_ok=True)
@@ -153,11 +153,11 @@ def _locked(part: Part, stack: ExitStack) -> bool:
         with suppress(OSError):
             number = os.open(path, OLD)
             stack.callback(os.close, number)
-            return held(number) is True and _is_at(path, number)
+            return held(number) is True and is_at(path, number)
     return False
 
 
-def _is_at(path: Path, number: int) -> bool:
+def is_at(path: Path, number: int) -> bool:
     """Whether the open file is still the one of that name."""
     try:
         return os.path.samestat(os.lstat(path), os.fstat(number))

@@ -12,7 +12,7 @@ from pathlib import Path
 from .errors import DriverError, FileError
 from .files import naming
 
-__all__ = ["PtyLine", "PtyUnavailable"]
+__all__ = ["PtyLine", "PtyUnavailable", "make_link"]
 
 MOST_PENDING = 1 << 20
 # Names of pseudo-terminals on Linux and the BSDs, and on macOS.
@@ -64,7 +64,7 @@ class PtyLine:
         self.name = self._pty = os.ttyname(self._slave)
         if self._link is not None:
             try:
-                _make_link(self._link, self._pty)
+                make_link(self._link, self._pty)
             except BaseException:
                 self._hang_up()
                 raise
@@ -125,10 +125,15 @@ class PtyLine:
         return bytes(data)
 
 
-def _make_link(link: Path, pty: str) -> None:
+def make_link(link: Path, pty: str) -> None:
     """Make `link` to `pty`, in the place of a link that an emulator left when it died, and of nothing else.
 
     Such a link leads to a pty that is gone, or whose number is ours now.
+
+    Raises
+    ------
+    FileError
+        When something else is there, or the file system refuses.
     """
     target = _target(link)
     ours = target is not None and PTY.fullmatch(target) is not None
