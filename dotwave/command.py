@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-import re
 from typing import Annotated, Any, NoReturn, Protocol
 
 import typer
+
+from .plain import printable
 
 __all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable"]
 
@@ -27,7 +28,6 @@ Pareto = Annotated[
     str | None,
     typer.Option(metavar="N|PICTURE|N:PICTURE", help="Also list what frame N (else 1) can be bought for; draw it."),
 ]
-CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 class Report(Protocol):
@@ -47,8 +47,3 @@ def finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
     typer.echo(printable(shown))
     raise typer.Exit(0 if ok else 1)
-
-
-def printable(words: str) -> str:
-    """`words` without control characters, which a text could use to write over the terminal."""
-    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", words)

@@ -16,6 +16,7 @@ from chainsim import load_device
 from drivers import ControllerSpec, Emulator, EmulatorStatus, Faults, Window
 
 from .errors import AppError
+from .plain import printable
 from .report import DOT_THRESHOLD
 
 __all__ = ["EmulateReport", "dots_as_braille", "emulate", "parse_window"]
@@ -158,7 +159,7 @@ class _Screen:
     def __init__(self, out: TextIO, device: str, port: str) -> None:
         self._out, self._live = out, out.isatty()
         self._lines = 0
-        out.write(f"{device} listens on {port}\n  dotwave play OUT --port {port} --live\n")
+        out.write(printable(f"{device} listens on {port}\n  dotwave play OUT --port {port} --live\n"))
         out.flush()
 
     def show(self, status: EmulatorStatus) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterator
-from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from .contact_sheet import figure_picture
 from .icon_report import IconsReport
 from .icon_set import Icon
 from .icon_words import in_braille, in_words
+from .plain import html_words
 
 __all__ = ["icon_page"]
 
@@ -56,7 +56,7 @@ def icon_page(report: IconsReport) -> str:
 
 def _page(report: IconsReport) -> Iterator[str]:
     count = len(report.icons)
-    title = f"{count} icons on {escape(report.device)}"
+    title = f"{count} icons on {html_words(report.device)}"
     yield '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
     yield f"<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>"
@@ -72,7 +72,9 @@ def _page(report: IconsReport) -> Iterator[str]:
     yield "</ul>"
     if report.failed:
         yield "<h2>Files that could not be used</h2>\n<ul>"
-        yield from (f"<li>{escape(name)}: {escape(error)}</li>" for name, error in report.failed.items())
+        yield from (
+            f"<li><bdi>{html_words(name)}</bdi>: {html_words(error)}</li>" for name, error in report.failed.items()
+        )
         yield "</ul>"
     yield "</main>\n</body>\n</html>"
 
@@ -82,7 +84,7 @@ def _close(report: IconsReport, places: dict[str, int]) -> Iterator[str]:
         return
     yield "<h2>Pairs that feel alike</h2>\n<ul>"
     for one, other, distance in report.close:
-        links = (f'<a href="#icon-{places[name]}">{escape(name)}</a>' for name in (one, other))
+        links = (f'<a dir="auto" href="#icon-{places[name]}">{html_words(name)}</a>' for name in (one, other))
         yield f"<li>{' and '.join(links)}: {_dots(distance)}</li>"
     yield "</ul>"
 
@@ -92,15 +94,15 @@ def _dots(distance: int) -> str:
 
 
 def _card(icon: Icon, places: dict[str, int]) -> Iterator[str]:
-    words = escape(in_words(icon.pattern.amplitude))
-    yield f'<li id="icon-{places[icon.name]}"><h3>{escape(icon.name)}</h3>'
+    words = html_words(in_words(icon.pattern.amplitude))
+    yield f'<li id="icon-{places[icon.name]}"><h3 dir="auto">{html_words(icon.name)}</h3>'
     yield f'<div class="pair"><img alt="" src="{_embedded(icon.figure)}">{_drawn(icon.pattern.amplitude, words)}</div>'
     yield f'<p class="braille">{in_braille(icon.pattern.amplitude)}</p>'
     yield f"<details><summary>Pattern in words</summary><p>{words}</p></details>"
     plan = "can be made" if icon.outcome == "ok" else f"{icon.outcome}: {icon.note}"
-    yield f'<p class="muted">Similarity {icon.pattern.similarity:.2f}; {escape(plan)}.</p>'
+    yield f'<p class="muted">Similarity {icon.pattern.similarity:.2f}; {html_words(plan)}.</p>'
     if icon.distance is not None:
-        near = f'<a href="#icon-{places[icon.nearest]}">{escape(icon.nearest)}</a>'
+        near = f'<a dir="auto" href="#icon-{places[icon.nearest]}">{html_words(icon.nearest)}</a>'
         yield f'<p class="muted">Nearest: {near}, {_dots(icon.distance)}.</p>'
     yield "</li>"
 

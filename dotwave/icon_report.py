@@ -18,6 +18,7 @@ from encoders import distinctness
 
 from .icon_set import Icon, felt_set
 from .icon_words import in_braille
+from .plain import csv_cell, one_line, printable
 
 __all__ = ["SCHEMA", "IconsReport", "write_report"]
 
@@ -112,7 +113,7 @@ class IconsReport:
 
     def as_text(self) -> str:
         """The report as lines of plain text."""
-        return "\n".join(self._lines())
+        return "\n".join(map(one_line, self._lines()))
 
     def _lines(self) -> Iterator[str]:
         outcomes = Counter(icon.outcome for icon in self.icons)
@@ -186,7 +187,8 @@ def _written(out: Path, files: Mapping[str, bytes]) -> tuple[str, ...]:
 
 
 def _json(value: Any) -> bytes:
-    return (json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n").encode()
+    # Escapes are the same words to whoever reads JSON.
+    return (printable(json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1)) + "\n").encode()
 
 
 def _csv(report: IconsReport) -> bytes:
@@ -195,7 +197,11 @@ def _csv(report: IconsReport) -> bytes:
     table.writeheader()
     for icon in report.icons:
         row = _row(icon)
-        table.writerow(row | {"pattern": "/".join(row["pattern"])})
+        table.writerow(_cells(row | {"pattern": "/".join(row["pattern"])}))
     for name, error in report.failed.items():
-        table.writerow({"name": name, "outcome": "bad_file", "note": error})
+        table.writerow(_cells({"name": name, "outcome": "bad_file", "note": error}))
     return text.getvalue().encode()
+
+
+def _cells(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: csv_cell(value) if isinstance(value, str) else value for name, value in row.items()}

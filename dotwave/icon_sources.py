@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import glob
-import lzma
-import tarfile
-import zipfile
-import zlib
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path, PurePosixPath
 
+from drivers import naming
 from encoders import PictureLimits
 
 from .errors import AppError
+from .icon_archives import ARCHIVES, BROKEN, members
+from .icon_names import shown_name, unique_names
 
 __all__ = ["IconFile", "IconPlace", "find_icons", "read_icons"]
 
 SUFFIXES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp"}
-ARCHIVES = (".zip", ".tar", ".tgz", ".tar.gz", ".tbz2", ".tar.bz2", ".txz", ".tar.xz")
-# What the readers of archives raise on damaged ones.
-BROKEN = (
-    EOFError, LookupError, NotImplementedError, OSError, RuntimeError, ValueError, lzma.LZMAError, tarfile.TarError,
-    zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 
 
 @dataclass(frozen=True, order=True)
@@ -49,7 +43,8 @@ class IconFile:
 def find_icons(sources: Sequence[str]) -> tuple[IconPlace, ...]:
     """Every picture of the sources, sorted by name; hidden files and other kinds are left out.
 
-    Names are paths below the folder or in the archive, after its name when there are several.
+    Names are paths below the folder or in the archive, after its name when there are several, as `shown_name` shows
+    them; two that are alike are numbered.
 
     Raises
     ------
@@ -61,24 +56,19 @@ def find_icons(sources: Sequence[str]) -> tuple[IconPlace, ...]:
         raise AppError(f"{', '.join(sources)}: no pictures found; give PNG, JPEG, GIF, WebP, BMP, TIFF or SVG files")
     several = len({place.container for place in places if place.member}) > 1
     named = sorted((_name(place, several), place) for place in places)
-    seen: Counter[str] = Counter()
-    found = []
-    for name, place in named:
-        seen[name] += 1
-        unique = name if seen[name] == 1 else f"{name} ({seen[name]})"
-        found.append(IconPlace(place.container, place.member, unique))
-    return tuple(found)
+    names = unique_names(name for name, _ in named)
+    return tuple(IconPlace(place.container, place.member, name) for name, (_, place) in zip(names, named, strict=True))
 
 
 def _name(place: IconPlace, several: bool) -> str:
     if not place.member:
-        return place.container.name
-    parts = [part for part in PurePosixPath(place.member).parts if part not in {"/", ".."}]
-    return "/".join([place.container.name, *parts] if several else parts)
+        return shown_name(place.container.name)
+    name = shown_name(place.member)
+    return f"{shown_name(place.container.name)}/{name}" if several else name
 
 
 def _paths(source: str) -> Iterable[Path]:
-    if Path(source).exists():
+    if os.path.exists(source):
         return [Path(source)]
     found = [path for path in map(Path, glob.glob(source, recursive=True)) if "__MACOSX" not in path.parts]
     if not found:
@@ -88,14 +78,15 @@ def _paths(source: str) -> Iterable[Path]:
 
 def _places(path: Path) -> Iterator[IconPlace]:
     if path.is_dir():
-        below = (found.relative_to(path).as_posix() for found in path.rglob("*") if found.is_file())
+        with naming(path):
+            below = [found.relative_to(path).as_posix() for found in path.rglob("*") if found.is_file()]
         yield from (IconPlace(path, name) for name in below if _is_icon(name))
     elif path.name.lower().endswith(ARCHIVES):
         try:
-            names = [name for name, _ in _members(path, None)]
+            names = [name for name, _ in members(path)]
         except BROKEN as error:
             raise AppError(f"{path}: the archive cannot be read: {_clause(error)}; fetch it again") from None
-        yield from (IconPlace(path, name) for name in names)
+        yield from (IconPlace(path, name) for name in names if _is_icon(name))
     elif path.suffix.lower() in SUFFIXES:
         yield IconPlace(path, "")
 
@@ -115,42 +106,30 @@ def read_icons(places: Iterable[IconPlace]) -> Iterator[IconFile]:
             yield from _unpacked(container, wanted, most)
             continue
         for member, name in wanted.items():
-            try:
-                with (container / member if member else container).open("rb") as file:
-                    yield IconFile(name, file.read(most))
-            except OSError as error:
-                yield IconFile(name, error=f"cannot be read: {_clause(error)}")
+            yield _member(name, partial(_first, container / member if member else container), most)
 
 
 def _unpacked(archive: Path, wanted: dict[str, str], most: int) -> Iterator[IconFile]:
     left = dict(wanted)
     problem = "it is not in the archive any more"
     try:
-        for member, data in _members(archive, most):
+        for member, first in members(archive):
             if member in left:
-                yield IconFile(left.pop(member), data)
+                yield _member(left.pop(member), first, most)
     except BROKEN as error:
         problem = f"the archive {archive.name} is damaged: {_clause(error)}; fetch it again"
     yield from (IconFile(name, error=problem) for name in left.values())
 
 
-def _members(archive: Path, most: int | None) -> Iterator[tuple[str, bytes]]:
-    """Names of the pictures in an archive with their first `most` bytes (None: unread), in the archive's order."""
-    if archive.name.lower().endswith(".zip"):
-        with zipfile.ZipFile(archive) as unzipped:
-            for info in unzipped.infolist():
-                if not info.is_dir() and _is_icon(info.filename):
-                    yield info.filename, b"" if most is None else _first(unzipped, info, most)
-        return
-    with tarfile.open(archive) as tar:
-        for entry in tar:
-            if entry.isfile() and _is_icon(entry.name):
-                file = None if most is None else tar.extractfile(entry)
-                yield entry.name, b"" if file is None or most is None else file.read(most)
+def _member(name: str, first: Callable[[int], bytes], most: int) -> IconFile:
+    try:
+        return IconFile(name, first(most))
+    except BROKEN as error:
+        return IconFile(name, error=f"cannot be read: {_clause(error)}")
 
 
-def _first(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
-    with archive.open(info) as file:
+def _first(path: Path, most: int) -> bytes:
+    with path.open("rb") as file:
         return file.read(most)
 
 

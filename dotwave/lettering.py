@@ -6,6 +6,8 @@ from functools import cache
 
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
+from .plain import one_line
+
 __all__ = [
     "ACCENT",
     "FAINT",
@@ -62,8 +64,8 @@ def has_glyphs(words: str) -> bool:
 
 
 def plain_letters(words: str) -> str:
-    """`words` on one line, with the dashes that every font has."""
-    return " ".join(words.translate(DASHES).split())
+    """`words` on one line, with the dashes that every font has; what must not be shown as it is as escapes."""
+    return one_line(" ".join(words.translate(DASHES).split()))
 
 
 def fit(words: str, letters: Font, room: float) -> str:

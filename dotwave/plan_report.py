@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from .plain import one_line
+
 __all__ = ["PlanReport", "plain"]
 
 
@@ -28,7 +30,7 @@ class PlanReport(ABC):
 
     def as_text(self) -> str:
         """The report as lines of plain text."""
-        return "\n".join(self._lines())
+        return "\n".join(map(one_line, self._lines()))
 
     @abstractmethod
     def _lines(self) -> Iterator[str]: ...

@@ -13,7 +13,8 @@ from drivers import atomic_files, naming
 
 from .card import CardShape, draw_card, draw_disc
 from .errors import AppError
-from .lettering import INK, MUTED, fit, font
+from .lettering import INK, MUTED, fit, font, plain_letters
+from .plain import one_line, printable
 from .progress import Update, progress
 from .report import VerifyReport, decibels
 from .spoken import spoken
@@ -46,7 +47,8 @@ class Preview:
 
     def as_text(self) -> str:
         """One line per file."""
-        return "\n".join([f"Drawn: {self.frames} frames.", *self.notes, *(f"Written: {name}" for name in self.files)])
+        lines = [f"Drawn: {self.frames} frames.", *self.notes, *(f"Written: {name}" for name in self.files)]
+        return "\n".join(map(one_line, lines))
 
 
 def write_preview(report: VerifyReport, start: Path) -> Preview:
@@ -129,7 +131,7 @@ def _head(sheet: Image.Image, report: VerifyReport, page: range) -> None:
     """Title, totals and the key to the discs, above the cards."""
     pen = ImageDraw.Draw(sheet)
     room = sheet.width - 2 * GUTTER
-    title = f"{Path(report.path).name} on {report.device}"
+    title = plain_letters(f"{Path(report.path).name} on {report.device}")
     shown = f"frames {page.start + 1} to {page.stop} of {len(report.frames)}"
     same = {True: ", text comes back", False: ", text differs", None: ""}[report.text_equal]
     error = f"error {100 * report.amplitude_error:.2f} %"
@@ -165,4 +167,4 @@ def _animate(cards: _Cards, file: BinaryIO) -> None:
 
 def _spell(report: VerifyReport, file: BinaryIO) -> None:
     for line in spoken(report):
-        file.write(f"{line}\n".encode())
+        file.write(f"{printable(line)}\n".encode())

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .plain import one_line
 from .plan_report import PlanReport, plain
 
 __all__ = [
@@ -242,7 +243,7 @@ class VerifyReport:
 
     def as_text(self) -> str:
         """The report as lines of plain text: the verdict, the totals, then only the frames that failed."""
-        return "\n".join(self._lines())
+        return "\n".join(map(one_line, self._lines()))
 
     def _lines(self) -> Iterator[str]:
         verdict = "Verified" if self.ok else "Verification failed"
@@ -255,7 +256,7 @@ class VerifyReport:
         yield f"Worst amplitude error: {worst} (at most {100 * AMPLITUDE_ERROR_LIMIT:g} % wanted)."
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         if self.text_equal is not None:
-            yield f"Text felt: {self.felt_text}"
+            yield f"Text felt: {' '.join(self.felt_text.split())}"
             yield f"Same as the source: {'yes' if self.text_equal else 'no'}."
         yield from _section("Differences", self.differences)
         failed = [self._failure(number) for number, frame in enumerate(self.frames, 1) if not frame.ok]

@@ -30,7 +30,7 @@ def spoken(report: VerifyReport) -> Iterator[str]:
 
 def _frame(frame: FrameCheck) -> Iterator[str]:
     yield f"Time: {frame.start_s:.2f} to {frame.end_s:.2f} s, settled at {frame.settled_s:.2f} s."
-    yield f"Text: {frame.text.strip() or '(none)'}"
+    yield f"Text: {' '.join(frame.text.split()) or '(none)'}"
     if frame.wanted_cells.strip() or frame.felt_cells.strip():
         yield f"Cells wanted: {_one_line(frame.wanted_cells)}"
         same = frame.felt_cells == frame.wanted_cells

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from drivers import atomic_file, naming
 
+from .plain import one_line
+
 if TYPE_CHECKING:
     from planner import ParetoFront, Tradeoff
 
@@ -61,7 +63,9 @@ def draw_tradeoff(found: Tradeoff, picture: Path, *, tol: float | None, budget_s
         ylabel="error, of the largest amplitude",
     )
     chains = "1 chain" if found.states == 1 else f"{found.states} chains"
-    axes.set_title(f"{chains} on {found.device}: filled the true error, outlined the rung's own estimate", fontsize=9)
+    title = one_line(f"{chains} on {found.device}: filled the true error, outlined the rung's own estimate")
+    # A name with dollar signs is no formula.
+    axes.set_title(title, fontsize=9, parse_math=False)
     axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     _save(figure, picture)
 
@@ -106,7 +110,8 @@ def draw_pareto(found: ParetoFront, picture: Path) -> None:
     for handle in legend.legend_handles:
         # Colour says something else.
         handle.set(facecolor="white", array=None)
-    axes.set_title(f"{len(found.points)} ways on {found.device} that no other beats", fontsize=10)
+    title = one_line(f"{len(found.points)} ways on {found.device} that no other beats")
+    axes.set_title(title, fontsize=10, parse_math=False)
     _save(figure, picture)
 
 

@@ -1,0 +1,105 @@
+"""What is in zip and tar archives, one member at a time; what one member is like stops no other."""
+
+from __future__ import annotations
+
+import io
+import lzma
+import struct
+import tarfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+__all__ = ["ARCHIVES", "BROKEN", "members"]
+
+ARCHIVES = (".zip", ".tar", ".tgz", ".tar.gz", ".tbz2", ".tar.bz2", ".txz", ".tar.xz")
+# What the readers of archives raise on damaged ones.
+BROKEN = (
+    EOFError, LookupError, NotImplementedError, OSError, RuntimeError, ValueError, lzma.LZMAError, tarfile.TarError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+
+# Longest name or other header of a tar member that is read, in bytes; tarfile itself would take any.
+LONGEST_HEADER = 1 << 20
+HEADERS = {
+    tarfile.GNUTYPE_LONGLINK, tarfile.GNUTYPE_LONGNAME, tarfile.SOLARIS_XHDTYPE, tarfile.XGLTYPE, tarfile.XHDTYPE,
+}  # fmt: skip
+# Zip's central directory: an entry's mark, its fixed part, where its flags are, and the flag for names in UTF-8.
+ENTRY, ENTRY_BYTES, FLAGS, UTF_8 = b"PK\1\2", 46, 8, 0x800
+ENCRYPTED = 0x1
+
+
+def members(archive: Path) -> Iterator[tuple[str, Callable[[int], bytes]]]:
+    """Names of the plain files in an archive, in its order, each with a function that reads its first bytes.
+
+    Links, devices and folders are left out. The function must be called before the next name is asked for.
+
+    Raises
+    ------
+    BROKEN
+        When the archive, or the part that comes next, cannot be read; the function too, for its member only.
+    """
+    if archive.name.lower().endswith(".zip"):
+        with _LenientNames(archive) as file, zipfile.ZipFile(file) as unzipped:
+            for info in unzipped.infolist():
+                if not info.is_dir():
+                    yield info.filename, partial(_first, unzipped, info)
+        return
+    with tarfile.open(archive, tarinfo=_Entry) as tar:
+        for entry in tar:
+            if entry.isfile():
+                yield entry.name, partial(_first_of_tar, tar, entry)
+
+
+def _first(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
+    if info.flag_bits & ENCRYPTED:
+        raise RuntimeError("it is encrypted; pack the archive without a password")
+    with archive.open(info) as file:
+        return file.read(most)
+
+
+def _first_of_tar(archive: tarfile.TarFile, entry: tarfile.TarInfo, most: int) -> bytes:
+    file = archive.extractfile(entry)
+    return b"" if file is None else file.read(most)
+
+
+class _Entry(tarfile.TarInfo):
+    """A header of bounded length: a small archive may unpack to one of many gigabytes."""
+
+    @classmethod
+    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _Entry:
+        entry = super().frombuf(buf, encoding, errors)
+        if entry.type in HEADERS and entry.size > LONGEST_HEADER:
+            raise tarfile.TarError(f"a header of {entry.size} bytes; at most {LONGEST_HEADER} are read")
+        return entry
+
+
+class _LenientNames(io.BufferedReader):
+    """A zip file in which a name that says it is UTF-8 and is not counts as code page 437, as old ones do.
+
+    zipfile gives up on the whole archive for one such name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """As of the file; the directory, which zipfile reads in one piece, has its flags put right."""
+        data = super().read(size)
+        return _relabelled(data) if data.startswith(ENTRY) else data
+
+
+def _relabelled(directory: bytes) -> bytes:
+    data, at = bytearray(directory), 0
+    while data[at : at + 4] == ENTRY and at + ENTRY_BYTES <= len(data):
+        (flags,) = struct.unpack_from("<H", data, at + FLAGS)
+        name, extra, comment = struct.unpack_from("<3H", data, at + 28)
+        end = at + ENTRY_BYTES + name
+        try:
+            data[at + ENTRY_BYTES : end].decode()
+        except UnicodeDecodeError:
+            struct.pack_into("<H", data, at + FLAGS, flags & ~UTF_8)
+        at = end + extra + comment
+    return bytes(data)
