@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
+from .early import EarlyPackets
 from .messages import (
     VERSION,
     Ack,
@@ -82,6 +84,8 @@ class VirtualController:
         self.session = 0
         self._recorder = recorder
         self._reader = PacketReader()
+        self._early = EarlyPackets(spec.early_packets)
+        self._version = 1
         self._next = 0
         self._events = 0
         self._gap = False
@@ -136,10 +140,13 @@ class VirtualController:
 
     def _take(self, packet: Packet) -> None:
         if packet.kind is Kind.HELLO:
+            # A host that has not greeted, or only knows version 1, gets the ACK of version 1.
+            self._version = max(1, min(VERSION, int.from_bytes(packet.payload, "little")))
             self._send(self._capabilities().packet())
         elif packet.kind is Kind.STOP:
             self.playout.hold(State.STOPPED)
             self.playout.clear()
+            self._early.clear()
             self.session, self._ack_due = 0, True
         elif packet.kind in (Kind.STATUS, Kind.HEARTBEAT):
             self._ack_due = True
@@ -154,15 +161,21 @@ class VirtualController:
                 return
             self._try(packet.number, lambda: self._start(start))
         elif not self.session or packet.number > self._next:
-            self._gap = True
-        elif packet.number == self._next:
-            self._try(packet.number, lambda: self._carry_out(packet))
+            # A host of version 1 cannot be told what is kept, and sends everything again.
+            kept = self.session and self._version > 1 and self._early.keep(packet, self._next)
+            self._gap = self._gap or not kept
+        else:
+            due: Packet | None = packet
+            while due is not None and due.number == self._next:
+                self._try(due.number, partial(self._carry_out, due))
+                due = self._early.take(self._next)
 
     def _try(self, number: int, work: Callable[[], None]) -> None:
         try:
             work()
         except _Refusal as refusal:
             self.playout.hold(State.STOPPED)
+            self._early.clear()
             self._send(Refused(number, str(refusal)).packet())
         else:
             self._next = number + 1
@@ -171,6 +184,7 @@ class VirtualController:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
         self.playout.begin(start.parametric)
+        self._early.clear()
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
             self._recorder.start(start)
@@ -231,8 +245,8 @@ class VirtualController:
     def _capabilities(self) -> Capabilities:
         spec = self.spec
         return Capabilities(
-            version=VERSION, rows=spec.rows, cols=spec.cols, channels=spec.channels, rate_hz=spec.rate_hz, bits=16,
-            buffer_samples=spec.buffer_samples, event_slots=spec.event_slots, max_payload=MAX_PAYLOAD,
+            version=self._version, rows=spec.rows, cols=spec.cols, channels=spec.channels, rate_hz=spec.rate_hz,
+            bits=16, buffer_samples=spec.buffer_samples, event_slots=spec.event_slots, max_payload=MAX_PAYLOAD,
             full_volts=spec.full_volts, lam_step=spec.lam_step, lam_max=spec.lam_max,
             watchdog_ms=round(spec.watchdog_s * 1000), ramp_ms=round(spec.ramp_s * 1000),
             session=self.session, next_number=self._next if self.session else 0, name=self.name,
@@ -248,6 +262,7 @@ class VirtualController:
             flags=Flag.GAP if self._gap else Flag(0), underruns=playout.underruns,
             bad=self._reader.bad & 0xFFFFFFFF, held_ms=round(playout.held_s * 1000),
             clock_us=round(self._now * 1e6),
+            kept=self._early.bits(self._next) if self._version > 1 else None,
         )  # fmt: skip
 
 

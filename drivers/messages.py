@@ -33,7 +33,7 @@ __all__ = [
 
 Codes = NDArray[np.int16]
 
-VERSION = 1
+VERSION = 2  # the newest spoken here; a controller and a host speak the newest that both know
 FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
 
 
@@ -49,7 +49,7 @@ class State(IntEnum):
 
 
 class Flag(IntFlag):
-    """What an ACK also says: GAP asks the host to send again from `next_number`."""
+    """What an ACK also says: with GAP, packets were thrown away because they came too early."""
 
     GAP = 1
 
@@ -60,7 +60,8 @@ class Capabilities:
 
     Attributes
     ----------
-    rows, cols, channels, rate_hz : the grid and its outputs. bits : of a sample; 16 in version 1.
+    version : the newest that it and the host know. rows, cols, channels, rate_hz : the grid and its outputs.
+    bits : of a sample; 16.
     buffer_samples, event_slots : room for samples (per channel) and for events. max_payload : bytes.
     full_volts : volts of sample code 32767. lam_step : lam of coupling code 1; lam_max : the largest lam.
     watchdog_ms : silence after which the output is at zero; ramp_ms : how long the ramp to zero takes.
@@ -269,6 +270,7 @@ class Ack:
         of the session's (START, END and SAMPLES are none).
     received, played : samples so far. underruns : how often the buffer ran dry. bad : frames that were no packet.
     held_ms : time spent at zero, waiting for the host, since sample 0. clock_us : its clock.
+    kept : from version 2 on, bit i for packet ``next_number + 1 + i``, which is here before its turn.
     """
 
     session: int
@@ -283,6 +285,7 @@ class Ack:
     bad: int
     held_ms: int
     clock_us: int
+    kept: int | None = None
 
     _struct: ClassVar = struct.Struct("<IIQIQQBBIIIQ")
 
@@ -292,15 +295,18 @@ class Ack:
             self.session, self.next_number, self.accept_samples, self.accept_events, self.received, self.played,
             self.state, self.flags, self.underruns, self.bad, self.held_ms, self.clock_us,
         )  # fmt: skip
-        return Packet(Kind.ACK, 0, self._struct.pack(*values))
+        kept = b"" if self.kept is None else self.kept.to_bytes(4, "little")
+        return Packet(Kind.ACK, 0, self._struct.pack(*values) + kept)
 
     @classmethod
     def of(cls, packet: Packet) -> Ack | None:
         """From bytes; None when the state is not known."""
-        values = list(cls._struct.unpack(packet.payload))
+        values = [*cls._struct.unpack_from(packet.payload), None]
         if values[6] not in State.__members__.values():
             return None
         values[6], values[7] = State(values[6]), Flag(values[7] & Flag.GAP)
+        if kept := packet.payload[cls._struct.size :][:4]:
+            values[12] = int.from_bytes(kept, "little")
         return cls(*values)
 
 

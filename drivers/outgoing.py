@@ -57,8 +57,12 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
     """
     device = manifest.device
     lam_max = max((max(event.lam, default=0.0) for event in manifest.coupling), default=0.0)
+    if not 1 <= found.version <= VERSION:
+        raise UnfitController(
+            f"controller {found.name!r}: it speaks protocol version {found.version}, dotwave {VERSION} and older; "
+            f"update dotwave or the firmware"
+        )
     for name, wanted, have in (
-        ("protocol version", VERSION, found.version),
         ("rows", device.rows, found.rows),
         ("columns", device.cols, found.cols),
         ("channels", len(manifest.channels), found.channels),

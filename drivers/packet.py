@@ -73,7 +73,7 @@ SHAPES = {
     Kind.SAMPLES: Shape(10, 2),
     Kind.END: Shape(8, 0),
     Kind.CAPABILITIES: Shape(45, 1),
-    Kind.ACK: Shape(58, 0),
+    Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),
     Kind.REFUSED: Shape(4, 1),
 }

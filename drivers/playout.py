@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chainsim import Device
 
 from .channels import channels_of
+from .early import MOST_EARLY
 from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Marked, State, Tones
 from .synthesis import Glide, ToneMix
 
@@ -32,7 +33,7 @@ class ControllerSpec:
     ----------
     buffer_samples, event_slots : room. full_volts : volts of the largest code. lam_step, lam_max : links.
     watchdog_s : silence after which the output is at zero. ramp_s : time the ramp to zero takes, <= watchdog_s.
-    drift_ppm : how much faster than nominal its sample clock runs.
+    drift_ppm : how much faster than nominal its sample clock runs. early_packets : kept for their turn, 0 to 32.
     """
 
     rows: int
@@ -47,6 +48,7 @@ class ControllerSpec:
     watchdog_s: float
     ramp_s: float
     drift_ppm: float
+    early_packets: int = MOST_EARLY
 
     @classmethod
     def of(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
@@ -13,6 +12,7 @@ from .errors import DriverError
 from .messages import VERSION, Ack, Capabilities, Flag, Marked, Refused, Samples, Start, State
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
+from .under_way import UnderWay
 
 __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "Timing"]
 
@@ -45,7 +45,7 @@ class Timing:
     hello_s : and greets again after this. window : packets under way. burst_bytes : sent at a time.
     """
 
-    heartbeat_s: float = 0.05
+    heartbeat_s: float = 0.025
     resend_s: float = 0.1
     hello_s: float = 0.25
     window: int = 32
@@ -85,15 +85,6 @@ class _Phase(Enum):
     FINISHED = 3
 
 
-@dataclass(frozen=True)
-class _Sent:
-    """An ordered packet that is not yet acknowledged."""
-
-    number: int
-    wire: bytes
-    samples: int
-
-
 class HostSession:
     """Brings messages to a controller: each once, in order, whatever the line does to them.
 
@@ -112,13 +103,11 @@ class HostSession:
         self._phase = _Phase.GREETING
         self._messages: Iterator[Message] | None = None
         self._waiting: Message | None = None
-        self._window: deque[_Sent] = deque()
-        self._cursor = 0
+        self._window = UnderWay(timing.window, timing.resend_s)
         self._next = 0
         self._events = 0
         self._ack: Ack | None = None
-        self._hello_at = self._sent_at = self._moved_at = -math.inf
-        self._resent: int | None = None
+        self._hello_at = self._sent_at = -math.inf
         self._first_mark: tuple[float, Marked] | None = None
         self.capabilities: Capabilities | None = None
         self.report = StreamReport()
@@ -178,24 +167,19 @@ class HostSession:
             self._hello_at = now
             # The zero ends whatever the line had of a packet before.
             return DELIMITER + HELLO
-        if self._window and now - self._moved_at > self._timing.resend_s:
-            self._go_back(now)
         out = bytearray()
-        while len(out) < self._timing.burst_bytes and (self._cursor < len(self._window) or self._pull()):
-            if self._cursor == 0:
-                self._moved_at = now
-            out += self._window[self._cursor].wire
-            self._cursor += 1
+        while len(out) < self._timing.burst_bytes:
+            wire = self._window.take(now)
+            if wire is not None:
+                out += wire
+            elif not self._pull():
+                break
+        self.report.resent = self._window.resent
         if not out and now - self._sent_at >= self._timing.heartbeat_s:
             out += HEARTBEAT
         if out:
             self._sent_at = now
         return bytes(out)
-
-    def _go_back(self, now: float) -> None:
-        self.report.resent += self._cursor
-        self._cursor = 0
-        self._moved_at = now
 
     def _pull(self) -> bool:
         """Put the next message into the window, if there is one, room and credit."""
@@ -203,7 +187,7 @@ class HostSession:
         if self._waiting is None:
             self._waiting = next(self._messages, None)
         message, ack = self._waiting, self._ack
-        if message is None or len(self._window) >= self._timing.window:
+        if message is None or self._window.full:
             return False
         samples = 0
         if isinstance(message, Samples):
@@ -214,7 +198,7 @@ class HostSession:
             if ack is None or self._events >= ack.accept_events:
                 return False
             self._events += 1
-        self._window.append(_Sent(self._next, encode(message.packet(self._next)), samples))
+        self._window.add(self._next, encode(message.packet(self._next)), samples)
         self._next += 1
         self._waiting = None
         return True
@@ -231,8 +215,8 @@ class HostSession:
                 f"controller {found.name!r} came back without the session, at {self.played_s:.3f} s; play again"
             )
         if found.session == self._session:
-            self._confirm(found.next_number, now)
-        self._go_back(now)
+            self._confirm(found.next_number, 0, now)
+        self._window.again(now)
         self._phase = _Phase.STREAMING
 
     def _acknowledged(self, ack: Ack, now: float) -> None:
@@ -241,26 +225,21 @@ class HostSession:
                 raise SessionLost(f"the controller ended the session at {self.played_s:.3f} s; play again")
             return
         self._ack = ack
-        self._confirm(ack.next_number, now)
+        self._confirm(ack.next_number, ack.kept or 0, now)
         report = self.report
         report.underruns, report.lost_s, report.bad_there = ack.underruns, ack.held_ms / 1000, ack.bad
         streaming = self._waiting is not None or self._window
         if ack.state is State.PLAYING and ack.played and streaming and self.capabilities is not None:
             stored = (ack.received - ack.played) / self.capabilities.rate_hz
             report.least_buffer_s = min(report.least_buffer_s, stored)
-        if Flag.GAP in ack.flags and self._window and self._resent != self._window[0].number:
-            self._resent = self._window[0].number
-            self._go_back(now)
+        if Flag.GAP in ack.flags:
+            self._window.gap(now)
         if ack.state is State.DONE and not self._window and not streaming:
             self._phase = _Phase.FINISHED
 
-    def _confirm(self, next_number: int, now: float) -> None:
-        while self._window and self._window[0].number < next_number:
-            sent = self._window.popleft()
-            self._cursor = max(0, self._cursor - 1)
-            self._moved_at = now
-            self.report.packets += 1
-            self.report.samples += sent.samples
+    def _confirm(self, next_number: int, kept: int, now: float) -> None:
+        self._window.arrived(next_number, kept, now)
+        self.report.packets, self.report.samples = self._window.packets, self._window.samples
 
     def _marked(self, marked: Marked, now: float) -> None:
         if self.capabilities is None:

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import zlib
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -147,6 +148,11 @@ def test_every_message_comes_back_from_its_bytes() -> None:
     tones = Tones(5, 1, 9, (Tone(1.5, 133.0, 0.25), Tone(0.5, 266.0, -1.0)))
     assert Capabilities.of(found.packet()) == found
     assert Ack.of(ack.packet()) == ack
+    for kept in (0, 1, 2**32 - 1):
+        assert Ack.of(replace(ack, kept=kept).packet()) == replace(ack, kept=kept)
+    # What a later version adds behind is passed over.
+    longer = Packet(Kind.ACK, 0, replace(ack, kept=5).packet().payload + bytes(8))
+    assert Ack.of(longer) == replace(ack, kept=5)
     assert Marked.of(Marked(3, 2**40, 2**50).packet()) == Marked(3, 2**40, 2**50)
     assert Refused.of(Refused(8, "nö").packet()) == Refused(8, "nö")
     for message in (

@@ -1,4 +1,4 @@
-/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), version 1.
+/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), versions 1 and 2.
  *
  * C99, one header, no allocation, no library but <stdint.h> and <stddef.h>. Feed it every byte that comes; it
  * passes over whatever is no packet, and never reads or writes outside its own struct, whatever the bytes are.
@@ -97,7 +97,7 @@ static inline int dw_length_fits(uint8_t kind, uint32_t length)
     case DW_SAMPLES: fixed = 10; item = 2; break;
     case DW_END: fixed = 8; item = 0; break;
     case DW_CAPABILITIES: fixed = 45; item = 1; break;
-    case DW_ACK: fixed = 58; item = 0; break;
+    case DW_ACK: fixed = 58; item = 4; break;
     case DW_MARKED: fixed = 20; item = 0; break;
     case DW_REFUSED: fixed = 4; item = 1; break;
     default: return 0;
