@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -43,10 +43,10 @@ class Study:
     Attributes
     ----------
     asked : what a person asked for. limit : largest error of a frame that is ok, full scale; None for any.
-    planning_s : seconds that planning has taken.
+    planning_s : seconds that planning has taken, by the clock.
     """
 
-    def __init__(self, asked: Asked | None = None) -> None:
+    def __init__(self, asked: Asked | None = None, clock: Callable[[], float] = time.perf_counter) -> None:
         self.asked = asked or Asked()
         self.limit = self.asked.tol
         self.planning_s = 0.0
@@ -56,6 +56,7 @@ class Study:
         self._device: Device | None = None
         self._pattern: TargetPattern | None = None
         self._idle = 0.0
+        self._clock = clock
 
     def otherwise(self, tol: float, budget_s: float | None) -> None:
         """Take what a job asks for where the command line says nothing."""
@@ -67,9 +68,9 @@ class Study:
         self._device = plan.device
         frames, number = iter(plan.frames), 0
         while True:
-            began = time.perf_counter()
+            began = self._clock()
             frame = next(frames, None)
-            self.planning_s += time.perf_counter() - began
+            self.planning_s += self._clock() - began
             if frame is None:
                 return
             number += 1
@@ -169,12 +170,12 @@ class Study:
 
         asked = self.asked
         left_s = None if asked.budget_s is None else max(asked.budget_s - self.planning_s, 1e-9)
-        began = time.perf_counter()
+        began = self._clock()
         if asked.tol is not None:
-            answer, _ = climb(question, tol=asked.tol)
+            answer, _ = climb(question, tol=asked.tol, clock=self._clock)
         else:
-            answer, _ = climb(question, budget_s=left_s)
-        spent = seconds_words(time.perf_counter() - began)
+            answer, _ = climb(question, budget_s=left_s, clock=self._clock)
+        spent = seconds_words(self._clock() - began)
         reached = float(max(answer.error_estimate))
         good = asked.tol is None or reached <= asked.tol
         verdict = "" if asked.tol is None else f", tolerance {asked.tol:g} {'met' if good else 'not met'}"

@@ -25,6 +25,8 @@ __all__ = ["PlanCache", "cache_path"]
 
 log = logging.getLogger(__name__)
 
+# How long another process may write before the cache is not waited for.
+PATIENCE_S = 2.0
 # SQLite takes at least 999 values in one question.
 ASKED_AT_ONCE = 500
 
@@ -70,7 +72,7 @@ class PlanCache:
         try:
             path = cache_path()
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._connection = sqlite3.connect(path, timeout=2.0, isolation_level=None, check_same_thread=False)
+            self._connection = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
             self._connection.execute("PRAGMA synchronous = OFF")
             self._connection.execute("CREATE TABLE IF NOT EXISTS plans (key BLOB PRIMARY KEY, value BLOB)")
         except (OSError, sqlite3.Error) as error:

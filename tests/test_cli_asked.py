@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -105,10 +106,32 @@ def test_without_a_tolerance_nothing_is_held_to_one() -> None:
 
 
 def test_a_budget_takes_the_best_answer_that_is_left_time_for(dotwave) -> None:
-    ended = dotwave("text", "a", "-d", "independent-6x6", "--budget", "100s")
+    ended = dotwave("text", "a", "-d", "independent-6x6", "--budget", "1e6s")
     assert ended.code == 0
     assert "Predicted by harmonic_balance to about " in ended.out
-    assert "Budget 100 s kept; by the clock" in ended.out
+    assert "Budget 1e+06 s kept; by the clock" in ended.out
+
+
+@pytest.mark.parametrize(
+    # A reading of the clock takes a second: planning one a frame and one to see the end, a step of the prediction two.
+    ("budget_s", "late", "rung", "kept"),
+    [
+        (2.5, 2, "linear", "not kept"),
+        (4, 0, "linear", "not kept"),
+        (5, 0, "linear", "kept"),
+        (18, 0, "one_harmonic", "kept"),
+        (20, 0, "harmonic_balance", "kept"),
+    ],
+)
+def test_frames_are_late_when_the_clock_says_so(budget_s: float, late: int, rung: str, kept: str) -> None:
+    seconds = itertools.count()
+    study = Study(asked_of(budget=f"{budget_s}s"), clock=lambda: float(next(seconds)))
+    frames = list(study.watched(plan_of("Hello there you all", "independent-6x6")))
+    assert [str(frame.outcome) for frame in frames] == ["ok"] * (4 - late) + ["out_of_budget"] * late
+    told = study.told(Blank(), True).reached
+    assert told[0] == "Planned in 5 s."
+    assert told[1].startswith(f"Predicted by {rung} ")
+    assert f"Budget {budget_s:g} s {kept}; by the clock" in told[-1]
 
 
 @pytest.mark.parametrize("command", ["text", "image", "render"])

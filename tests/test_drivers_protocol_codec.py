@@ -220,7 +220,7 @@ def harness(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("harness") / "decoder"
     command = [gcc, "-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *SANITIZERS]
     source = ROOT / "tests" / "data" / "decoder_harness.c"
-    subprocess.run([*command, "-I", ROOT / "drivers" / "firmware", source, "-o", out], check=True, timeout=100)
+    subprocess.run([*command, "-I", ROOT / "drivers" / "firmware", source, "-o", out], check=True, timeout=600)
     return out
 
 

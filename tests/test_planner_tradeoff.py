@@ -1,5 +1,6 @@
 """Speed against accuracy: errors against known answers, estimates that bound them, choices, and complaints."""
 
+import itertools
 import json
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from encoders import Frame, GridShape, Scene, TextOptions, TextSource, encode_te
 from planner import FramePlan, Tone, plan_scene
 from planner.analysis.climbing import climb
 from planner.analysis.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
-from planner.analysis.tradeoff import Tradeoff, TradeoffRow, trade_off
+from planner.analysis.tradeoff import LONG_S, Tradeoff, TradeoffRow, by_clock, trade_off
 
 SHAPE = GridShape(6, 6)
 
@@ -21,14 +22,20 @@ def frames_of(text, name):
     return list(plan_scene(encode_text(TextSource.of_text(text), SHAPE, TextOptions()), device).frames), device
 
 
+def priced(frames, device, prices=None):
+    """The trade-off at given prices: without any, each row costs a millisecond more than the one before it."""
+    costs = itertools.count(1e-3, 1e-3) if prices is None else iter(prices)
+    return trade_off(frames, device, price=lambda run: (run(), next(costs)))
+
+
 @pytest.fixture(scope="module")
 def single():
-    return trade_off(*frames_of("a", "independent-6x6"))
+    return priced(*frames_of("a", "independent-6x6"))
 
 
 @pytest.fixture(scope="module")
 def still():
-    return trade_off(*frames_of("a", "paper-6x6"))
+    return priced(*frames_of("a", "paper-6x6"))
 
 
 def row_of(found, rung, tol=None):
@@ -64,8 +71,39 @@ def test_work_grows_along_the_ladder(single):
     ]
     assert steps[0].newton_steps == 0 < steps[1].newton_steps
     assert steps[1].rhs_evals == 0 < steps[2].rhs_evals
-    assert all(row.seconds > 0 for row in single.rows)
-    assert row_of(single, "linear").memory > 0
+
+
+def test_rows_carry_their_price_and_long_ones_are_not_watched(single):
+    assert [row.seconds for row in single.rows] == pytest.approx([1e-3 * (at + 1) for at in range(len(single.rows))])
+    assert all(row.memory > 0 for row in single.rows)
+    dear = priced(*frames_of("a", "independent-6x6"), prices=itertools.repeat(1.01 * LONG_S))
+    assert all(row.memory is None for row in dear.rows)
+
+
+def test_choices_on_a_scene_follow_the_prices(single):
+    names = [(row.rung, row.tol) for row in single.rows]
+    assert names[:3] == [("linear", None), ("one_harmonic", None), ("harmonic_balance", 1e-2)]
+    chosen = single.cheapest(1e-3)
+    assert (chosen.row.rung, chosen.met) == ("one_harmonic", True)
+    # In two milliseconds only the first two rows are ready; in the third the next is.
+    assert [single.within(1e-3 * (at + 0.5)).row.rung for at in (1, 2, 3)] == [
+        "linear", "one_harmonic", "harmonic_balance",
+    ]  # fmt: skip
+    # At prices the other way round the first row is the dearest, and the last of all serves both.
+    frames, device = frames_of("a", "independent-6x6")
+    turned = priced(frames, device, [1e-3 * (len(names) - at) for at in range(len(names))])
+    assert turned.cheapest(1e-3).row == turned.within(1.5e-3).row == turned.rows[-1]
+
+
+def test_the_price_by_the_clock_is_the_best_of_a_few_runs():
+    runs = itertools.count()
+    for spent, price, made in (((0.2, 0.1, 0.3), 0.1, 3), ((0.1, 5.0, 0.05), 0.05, 3), ((9.0,), 9.0, 1)):
+        readings = iter([each for long in spent for each in (100.0, 100.0 + long)])
+        before = next(runs)
+        answers, seconds = by_clock(lambda: [next(runs)], lambda readings=readings: next(readings))
+        assert seconds == pytest.approx(price)
+        assert answers == [before + made]
+        assert next(readings, None) is None
 
 
 def test_equal_chains_are_compared_once(single, still):
@@ -149,12 +187,21 @@ def test_climbing_stops_at_the_first_that_will_do():
         assert np.abs(felt(found, question) - truth).max() <= tol * np.abs(truth).max()
         assert words.endswith("met")
         assert "not met" not in words
-    found, words = climb(question, budget_s=1e-9)
-    assert found.rung == "linear"
-    assert words.endswith("not met")
-    found, words = climb(question, budget_s=100.0)
-    assert found.rung == "harmonic_balance"
-    assert words.endswith(" met")
+
+
+@pytest.mark.parametrize(
+    # A step takes 1 s, and the choice of it another: the next is tried while ten times the last one is left.
+    ("budget_s", "rung", "spent", "verdict"),
+    [(1e-9, "linear", 4, "not met"), (12.9, "linear", 4, "met"), (13.1, "one_harmonic", 6, "met"),
+     (1e3, "harmonic_balance", None, "met")],
+)  # fmt: skip
+def test_climbing_keeps_to_the_time(budget_s, rung, spent, verdict):
+    question = questions_of(*frames_of("a", "independent-6x6"))[0][0]
+    seconds = itertools.count()
+    found, words = climb(question, budget_s=budget_s, clock=lambda: float(next(seconds)))
+    assert found.rung == rung
+    assert spent is None or f" in {spent} s" in words
+    assert words.endswith(f"; budget {seconds_words(budget_s)} {verdict}")
 
 
 def test_plain_json(single):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -20,12 +21,18 @@ GROWTH = 10.0
 COLD_S = 3.0
 
 
-def climb(question: Question, *, tol: float | None = None, budget_s: float | None = None) -> tuple[Response, str]:
+def climb(
+    question: Question,
+    *,
+    tol: float | None = None,
+    budget_s: float | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> tuple[Response, str]:
     """The cheapest answer whose own estimate meets `tol`, or the best that comes within `budget_s`, and what it is.
 
     Rungs are tried from the cheapest; nothing is compared with a reference. A rung that has begun is not stopped: the
     next one is tried only when ten times what the last one took is left of the time, and the full equations only when
-    there is time to load what is compiled for them.
+    there is time to load what is compiled for them. `clock` tells the time in seconds.
 
     Raises
     ------
@@ -35,19 +42,19 @@ def climb(question: Question, *, tol: float | None = None, budget_s: float | Non
     if (tol is None) == (budget_s is None):
         raise TradeoffError("climb: expected either a tolerance or a budget")
     positive("tol" if tol is not None else "budget", tol or budget_s or 0.0)
-    began, best, last = time.perf_counter(), None, 0.0
+    began, best, last = clock(), None, 0.0
     for rung, asked in _ladder(question, tol):
-        start = time.perf_counter()
+        start = clock()
         if best is not None and budget_s is not None and start - began + GROWTH * last + _loading_s(rung) > budget_s:
             break
         found = answer(rung, asked, question)
-        last = time.perf_counter() - start
+        last = clock() - start
         if best is None or _estimate(found) < _estimate(best):
             best = found
         if _estimate(best) <= (FINEST if tol is None else tol):
             break
     assert best is not None
-    reached, spent = _estimate(best), time.perf_counter() - began
+    reached, spent = _estimate(best), clock() - began
     met = spent <= budget_s if budget_s is not None else reached <= (tol or 0.0)
     wish = f"tolerance {tol:g}" if tol is not None else f"budget {seconds_words(budget_s or 0.0)}"
     verdict = "met" if met else "not met"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import tracemalloc
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,10 +29,13 @@ from .questions import (
     seconds_words,
 )
 
-__all__ = ["Choice", "Tradeoff", "TradeoffRow", "trade_off"]
+__all__ = ["Choice", "Price", "Tradeoff", "TradeoffRow", "by_clock", "trade_off"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+Run = Callable[[], list[Response]]
+Price = Callable[[Run], tuple[list[Response], float]]
+"""Makes a run, and gives its answers and what they cost in seconds."""
 
 # Rungs whose work grows with the accuracy asked for; the others give what they have.
 ADJUSTABLE = ("harmonic_balance", "ode", "auto")
@@ -148,8 +151,24 @@ def _told(row: TradeoffRow) -> str:
     return f"{row.rung}{asked} reaches {row.error:.1e} in {seconds_words(row.seconds)}"
 
 
-def trade_off(frames: Iterable[FramePlan], device: Device) -> Tradeoff:
+def by_clock(run: Run, clock: Callable[[], float] = time.perf_counter) -> tuple[list[Response], float]:
+    """The price of a run by the clock: the best of a few; a long one is made once."""
+    seconds = math.inf
+    for _ in range(REPEATS):
+        began = clock()
+        answers = run()
+        seconds = min(seconds, clock() - began)
+        if seconds > LONG_S:
+            break
+    return answers, seconds
+
+
+def trade_off(frames: Iterable[FramePlan], device: Device, *, price: Price = by_clock) -> Tradeoff:
     """Solve a scene's chains with every rung that can, at every tolerance, and compare with the dearest answer.
+
+    Parameters
+    ----------
+    price : what each rung and tolerance costs, asked in the order of the rows.
 
     Raises
     ------
@@ -167,7 +186,7 @@ def trade_off(frames: Iterable[FramePlan], device: Device) -> Tradeoff:
         asked = [(_stand_in(rung, one, questions), one) for one in questions]
         why = next((text for name, one in asked if (text := refusal(name, one))), "")
         for tol in () if why else TOLS if rung in ADJUSTABLE else (None,):
-            row = _measured(rung, tol, asked, [each.motion for each in references])
+            row = _measured(rung, tol, asked, [each.motion for each in references], price)
             if not row.solved:
                 why = "it finds the planned motion of no chain"
                 break
@@ -216,19 +235,13 @@ def _reference(question: Question) -> _Reference:
 
 
 def _measured(
-    rung: str, tol: float | None, asked: list[tuple[str, Question]], truths: list[Complexes]
-) -> TradeoffRow:  # fmt: skip
+    rung: str, tol: float | None, asked: list[tuple[str, Question]], truths: list[Complexes], price: Price
+) -> TradeoffRow:
     first = [(name, Question(one.chain, one.setting[:1], one.planned[:1])) for name, one in asked]
     for name, one in first:
         # Imports and compiled code are no part of the price.
         answer(name, tol, one)
-    seconds = math.inf
-    for _ in range(REPEATS):
-        began = time.perf_counter()
-        answers = [answer(name, tol, one) for name, one in asked]
-        seconds = min(seconds, time.perf_counter() - began)
-        if seconds > LONG_S:
-            break
+    answers, seconds = price(lambda: [answer(name, tol, one) for name, one in asked])
     memory = _memory(tol, asked) if seconds <= LONG_S else None
     told = [(found, one, truth) for found, (_, one), truth in zip(answers, asked, truths, strict=True)]
     known = np.concatenate([same(*each) for each in told])

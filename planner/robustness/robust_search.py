@@ -1,4 +1,4 @@
-"""One chain's settings, judged and improved under spread: the search below `planner.spreading.robust`."""
+"""One chain's settings, judged and improved under spread: the search below `planner.robustness.robust`."""
 
 from __future__ import annotations
 
