@@ -1,7 +1,8 @@
 """The command line: reads arguments, calls one function, prints.
 
-Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input, with one line
-on stderr; 130 after Ctrl-C; 143 after SIGTERM. Imports that take time stay inside the commands.
+Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input or circumstances, with
+one line on stderr; 70 a fault of the program; 130 after Ctrl-C; 141 when nobody reads the output any more; 143 after
+SIGTERM. Imports that take time stay inside the commands.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, printable
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, say
 from .command import finish as _finish
-from .errors import Terminated, bad_input
+from .ending import ended
+from .errors import Terminated
 from .options import Dots, Presentation, SampleFormat, Undefined
 
 __all__ = ["app", "main"]
@@ -120,7 +122,7 @@ def simulate(
     from .source import simulation_source
 
     answer = solve(simulation_source(chain))
-    typer.echo(json.dumps(answer, allow_nan=False))
+    say(json.dumps(answer, allow_nan=False))
     raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
 
 
@@ -232,12 +234,4 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             # A terminal that cannot show Braille gets escapes, not a traceback.
             stream.reconfigure(errors="backslashreplace")
-    try:
-        app(prog_name="dotwave")
-    except SystemExit:
-        raise
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except bad_input() as error:
-        typer.echo(f"dotwave: {printable(' '.join(str(error).split()))}", err=True)
-        sys.exit(2)
+    sys.exit(ended(lambda: app(prog_name="dotwave")))

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .command import Budget, Device, Explain, Json, Pareto, Tol, finish
+from .command import Budget, Device, Explain, Json, Pareto, Tol, finish, say
 from .options import SampleFormat
 
 __all__ = ["picture_app"]
@@ -141,4 +141,4 @@ def schema() -> None:
     """
     from .job import job_schema
 
-    typer.echo(json.dumps(job_schema(), indent=2))
+    say(json.dumps(job_schema(), indent=2))

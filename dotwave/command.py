@@ -8,7 +8,9 @@ from typing import Annotated, Any, NoReturn, Protocol
 
 import typer
 
-__all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable"]
+from .errors import AppError
+
+__all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable", "say"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Device = Annotated[
@@ -45,8 +47,24 @@ class Report(Protocol):
 def finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
     """Print a report, as JSON or as text, and end with exit code 0 or 1."""
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
-    typer.echo(printable(shown))
+    say(shown)
     raise typer.Exit(0 if ok else 1)
+
+
+def say(words: str) -> None:
+    """Print `words` on standard output.
+
+    Raises
+    ------
+    AppError
+        When it cannot take them; a reader that has gone is a BrokenPipeError.
+    """
+    try:
+        typer.echo(printable(words))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise AppError(f"standard output: {error.strerror or error}; send it elsewhere, or free some space") from None
 
 
 def printable(words: str) -> str:
