@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from chainsim import Device, Outcome
-from drivers import Encoding, WrittenWaveform, naming, write_waveform
+from drivers import Encoding, WrittenWaveform, write_waveform
 from encoders import (
     EncodeError,
     Frame,
@@ -86,8 +86,6 @@ def render_job(path: Path, out: Path | None = None, study: Study | None = None) 
             raise AppError(f"{path}: sequence.{number}: {error}") from None
     if out is None and job.output is not None:
         out = Path(os.path.normpath(folder / job.output))
-        with naming(out.parent):
-            out.parent.mkdir(parents=True, exist_ok=True)
     study = study or Study()
     study.otherwise(job.tol, job.budget.planning_s if job.budget else None)
     how = Rendering(out, job.sample_format, job.contrast_db, study)

@@ -129,7 +129,7 @@ def _claim(parts: Path, sweep: SettingSweep, fields: tuple[str, ...], chunk: int
         if json.loads(note.read_text(encoding="utf-8")) != mine:
             raise AppError(f"{parts}: left by another sweep; finish that one, or delete the folder")
         return
-    parts.mkdir(parents=False, exist_ok=True)
+    parts.mkdir(parents=True, exist_ok=True)
     _atomically(note, lambda aside: aside.write_text(json.dumps(mine), encoding="utf-8"))
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers import atomic_path, naming
+
 from .errors import AppError
 
 if TYPE_CHECKING:
@@ -113,7 +115,8 @@ def _paint(panels: list[tuple[str, NDArray[np.uint8]]], up: _Axis, right: _Axis,
             pen.text((4, TITLE), f"{up.last:.4g}", fill="black", font_size=10 + height // 100)
             pen.text((4, TITLE + height // 2), up.name, fill="black", font_size=10 + height // 100)
     _legend(pen, height)
-    whole.save(picture, format="PNG", **_FAST)
+    with atomic_path(picture) as aside, naming(picture):
+        whole.save(aside, format="PNG", **_FAST)
 
 
 def _legend(pen: Any, height: int) -> None:

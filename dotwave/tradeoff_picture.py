@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drivers import atomic_path
+
 if TYPE_CHECKING:
     from planner import ParetoFront, Tradeoff
 
@@ -122,7 +124,8 @@ def _axes(size: tuple[float, float]) -> tuple[Any, Any]:
 
 
 def _save(figure: Any, picture: Path) -> None:
-    picture.parent.mkdir(parents=True, exist_ok=True)
+    kind = picture.suffix.lower().removeprefix(".")
     # No date in the file: the same numbers give the same bytes.
-    still: dict[str, None] = {"Date": None} if picture.suffix.lower() == ".svg" else {"Software": None}
-    figure.savefig(picture, dpi=110, metadata=still)
+    still: dict[str, None] = {"Date": None} if kind == "svg" else {"Software": None}
+    with atomic_path(picture) as aside:
+        figure.savefig(aside, format=kind, dpi=110, metadata=still)

@@ -36,9 +36,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
     """Write files aside, in the folders where they belong; put them in place together when the body ends well.
 
-    Gives empty files to write to. At the end all are flushed to the disk, then renamed in the given order, so
-    that the last one's presence says that all are whole. Whatever stops the body (an error, Ctrl-C), nothing
-    new is left.
+    Gives empty files to write to; folders that are missing are made. At the end all are flushed to the disk, then
+    renamed in the given order, so that the last one's presence says that all are whole. Whatever stops the body (an
+    error, Ctrl-C), nothing new is left, no folder either.
 
     Raises
     ------
@@ -47,9 +47,11 @@ def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
     """
     asides = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
     made: list[Path] = []
+    folders: list[Path] = []
     try:
         for path, aside in zip(paths, asides, strict=True):
             with naming(path):
+                _make_folders(path.parent, folders)
                 if path.is_dir():
                     raise IsADirectoryError(errno.EISDIR, "is a folder")
                 made.append(aside)
@@ -63,10 +65,24 @@ def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
                 aside.replace(path)
                 made[made.index(aside)] = path
         made.clear()
+        folders.clear()
     finally:
         for leftover in made:
             with suppress(OSError):
                 leftover.unlink()
+        for folder in reversed(folders):
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def _make_folders(folder: Path, made: list[Path]) -> None:
+    """Make `folder` and what it lies in, where missing; each that is made is noted in `made`."""
+    if folder.exists():
+        return
+    _make_folders(folder.parent, made)
+    with suppress(FileExistsError):
+        folder.mkdir()
+        made.append(folder)
 
 
 @contextmanager
