@@ -16,12 +16,14 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from .cli_help import LOOK, RENDER, SET_UP, STUDY, Commands
 from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
 from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, say
 from .command import finish as _finish
+from .completion import completed_devices, completed_files
 from .ending import ended
 from .errors import Terminated
 from .options import Dots, Presentation, SampleFormat, Undefined
@@ -32,7 +34,7 @@ app = typer.Typer(
     name="dotwave",
     help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
     no_args_is_help=True,
-    add_completion=False,
+    cls=Commands,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -41,9 +43,16 @@ app = typer.Typer(
 GAP = "in actuators."
 
 
-@app.command(short_help="Render text as Braille that can be felt.")
+@app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
 def text(
-    source: Annotated[str, typer.Argument(metavar="TEXT|FILE|-", help="A file if it exists, - for stdin, else words.")],
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="TEXT|FILE|-",
+            help="A file if it exists, - for stdin, else words.",
+            autocompletion=completed_files(".txt", ".brf", ".brl"),
+        ),
+    ],
     device: Device = "paper-6x6",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
@@ -102,11 +111,17 @@ def text(
     _finish(told, as_json, ok=told.ok)
 
 
-@app.command(short_help="Solve one chain and print its steady state.")
+@app.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
 def simulate(
     chain: Annotated[
-        str, typer.Argument(metavar="CHAIN.yaml", help="The chain, its setting and a tolerance; - is stdin.")
+        str,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, its setting and a tolerance; - is stdin.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
     ],
+    as_json: Annotated[bool, typer.Option("--json", help="As without it: the answer is JSON.")] = False,
 ) -> None:
     """Solve a chain of coupled oscillators and print what it does, as JSON.
 
@@ -126,7 +141,7 @@ def simulate(
     raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
 
 
-@app.command(short_help="Say what a written waveform makes felt.")
+@app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)
 def verify(out: Written, as_json: Json = False) -> None:
     """Integrate the full equations under the samples of a written waveform and say what is felt.
 
@@ -143,7 +158,7 @@ def verify(out: Written, as_json: Json = False) -> None:
     _finish(report, as_json, ok=report.ok)
 
 
-@app.command(short_help="Draw and spell out what a written waveform makes felt.")
+@app.command(short_help="Draw and spell out what a written waveform makes felt.", rich_help_panel=LOOK)
 def preview(
     out: Written,
     output: Annotated[
@@ -167,9 +182,12 @@ def preview(
     _finish(report, as_json, ok=True)
 
 
-@app.command(short_help="List device profiles, or print one.")
+@app.command(short_help="List device profiles, or print one.", rich_help_panel=SET_UP)
 def devices(
-    name: Annotated[str | None, typer.Argument(help="One profile, or a YAML file: print every value.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="One profile, or a YAML file: print every value.", autocompletion=completed_devices),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List the built-in device profiles, with the values that are assumed rather than given.
@@ -183,7 +201,7 @@ def devices(
     _finish(list_devices(name), as_json, ok=True)
 
 
-@app.command(short_help="List translation tables.")
+@app.command(short_help="List translation tables.", rich_help_panel=SET_UP)
 def tables(
     wanted: Annotated[
         str | None, typer.Argument(metavar="FILTER", help="Part of a file name, language or name.")
@@ -201,7 +219,7 @@ def tables(
     _finish(list_translation_tables(wanted), as_json, ok=True)
 
 
-@app.command(short_help="Check this installation.")
+@app.command(short_help="Check this installation.", rich_help_panel=SET_UP)
 def doctor(as_json: Json = False) -> None:
     """Check Python, the packages, liblouis, the cache and the disk, and name the cure for what is wrong.
 

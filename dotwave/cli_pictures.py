@@ -8,21 +8,32 @@ from typing import Annotated
 
 import typer
 
+from .cli_help import RENDER
 from .command import Budget, Device, Explain, Json, Pareto, Tol, finish, say
+from .completion import completed_files
 from .options import SampleFormat
 
 __all__ = ["picture_app"]
 
 picture_app = typer.Typer(rich_markup_mode=None)
 
+PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
+ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
 Contrast = Annotated[
     float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
 ]
 
 
-@picture_app.command(short_help="Render pictures as patterns that can be felt.")
+@picture_app.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
 def image(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.",
+            autocompletion=completed_files(*PICTURES),
+        ),
+    ],
     device: Device = "paper-6x6",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
     explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
@@ -61,10 +72,15 @@ def image(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Render a set of icons and tell them apart.")
+@picture_app.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
 def icons(
     sources: Annotated[
-        list[str], typer.Argument(metavar="DIR|GLOB|ARCHIVE...", help="Folders, globs, zip or tar archives.")
+        list[str],
+        typer.Argument(
+            metavar="DIR|GLOB|ARCHIVE...",
+            help="Folders, globs, zip or tar archives.",
+            autocompletion=completed_files(*PICTURES, *ARCHIVES),
+        ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
     device: Device = "paper-6x6",
@@ -102,9 +118,16 @@ def icons(
     finish(report, as_json, ok=report.ok)
 
 
-@picture_app.command(short_help="Carry out a job file.")
+@picture_app.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
 def render(
-    job: Annotated[Path, typer.Argument(metavar="JOB.yaml", help="Device, tolerance, output and a sequence.")],
+    job: Annotated[
+        Path,
+        typer.Argument(
+            metavar="JOB.yaml",
+            help="Device, tolerance, output and a sequence.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
     tol: Tol = None,
     budget: Budget = None,
@@ -131,7 +154,7 @@ def render(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Print the JSON Schema of job files.")
+@picture_app.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them.
 

@@ -8,15 +8,29 @@ from typing import Annotated, Any, NoReturn, Protocol
 
 import typer
 
+from .completion import completed_devices, completed_files
 from .errors import AppError
 
 __all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable", "say"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Device = Annotated[
-    str, typer.Option("--device", "-d", help="A built-in profile or a YAML file; see `dotwave devices`.")
+    str,
+    typer.Option(
+        "--device",
+        "-d",
+        help="A built-in profile or a YAML file; see `dotwave devices`.",
+        autocompletion=completed_devices,
+    ),
 ]
-Written = Annotated[str, typer.Argument(metavar="OUT", help="A waveform written by `dotwave text` (.wav or .json).")]
+Written = Annotated[
+    str,
+    typer.Argument(
+        metavar="OUT",
+        help="A waveform written by `dotwave text` (.wav or .json).",
+        autocompletion=completed_files(".wav", ".npz", ".csv", ".raw", ".json"),
+    ),
+]
 Tol = Annotated[
     str | None,
     typer.Option(help="Largest error of full scale: draft, normal, fine or a number; says what it took."),

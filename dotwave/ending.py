@@ -7,7 +7,6 @@ import re
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,6 +92,9 @@ def _refused(error: OSError) -> str:
 
 
 def _version() -> str:
+    # Imported here: only a fault needs it.
+    from importlib import metadata
+
     try:
         return metadata.version("dotwave")
     except metadata.PackageNotFoundError:
