@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from chainsim import Closure, Device, Outcome, load_device
-from drivers import atomic_path, naming
 
 from .errors import AppError
 from .measured_sweeps import ChainPlace, read_sweeps
@@ -120,11 +120,9 @@ def calibrate(source: str, *, device: str, out: Path | None, lam_set: float | No
     Raises
     ------
     AppError
-        When the table does not fit (with line and column), the device's chains are rings.
+        When the table does not fit (with line and column), the device's chains are rings, or `out` cannot be written.
     chainsim.ProfileError
         When there is no such device.
-    drivers.FileError
-        When `out` cannot be written.
     planner.PlanError
         When the points cannot determine the numbers.
     """
@@ -179,7 +177,7 @@ def _fitted(device: Device, place: ChainPlace, fit: ChainFit) -> list[FittedActu
 
 
 def _write(out: Path, device: Device, entries: Sequence[dict[str, Any]]) -> None:
-    """The profile with its actuators, one a line."""
+    """The profile with its actuators, one a line; written aside first, so that no half of it is ever there."""
     profile = device.as_dict() | {"name": out.stem[:80]}
     mine = {(entry["row"], entry["col"]) for entry in entries}
     before = [_known(entry) for entry in profile.pop("actuators", [])]
@@ -188,8 +186,15 @@ def _write(out: Path, device: Device, entries: Sequence[dict[str, Any]]) -> None
     head = yaml.safe_dump(profile, sort_keys=False, allow_unicode=True, width=110)
     lines = [yaml.safe_dump(e, sort_keys=False, default_flow_style=True, width=10_000).strip() for e in everyone]
     text = head + "".join(["actuators:\n", *(f"  - {line}\n" for line in lines)])
-    with atomic_path(out) as aside, naming(out):
-        aside.write_text(text, encoding="utf-8")
+    aside = out.with_name(f".{out.name}.{os.getpid()}")
+    try:
+        try:
+            aside.write_text(text, encoding="utf-8")
+            aside.replace(out)
+        finally:
+            aside.unlink(missing_ok=True)
+    except OSError as error:
+        raise AppError(f"{out}: {error.strerror or error}; choose another place with -o") from None
 
 
 def _known(entry: dict[str, Any]) -> dict[str, Any]:

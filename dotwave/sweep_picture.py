@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers import atomic_path, naming
-
 from .errors import AppError
 
 if TYPE_CHECKING:
@@ -115,8 +113,7 @@ def _paint(panels: list[tuple[str, NDArray[np.uint8]]], up: _Axis, right: _Axis,
             pen.text((4, TITLE), f"{up.last:.4g}", fill="black", font_size=10 + height // 100)
             pen.text((4, TITLE + height // 2), up.name, fill="black", font_size=10 + height // 100)
     _legend(pen, height)
-    with atomic_path(picture) as aside, naming(picture):
-        whole.save(aside, format="PNG", **_FAST)
+    whole.save(picture, format="PNG", **_FAST)
 
 
 def _legend(pen: Any, height: int) -> None:

@@ -6,8 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drivers import atomic_path
-
 if TYPE_CHECKING:
     from planner import ParetoFront, Tradeoff
 
@@ -124,8 +122,7 @@ def _axes(size: tuple[float, float]) -> tuple[Any, Any]:
 
 
 def _save(figure: Any, picture: Path) -> None:
-    kind = picture.suffix.lower().removeprefix(".")
+    picture.parent.mkdir(parents=True, exist_ok=True)
     # No date in the file: the same numbers give the same bytes.
-    still: dict[str, None] = {"Date": None} if kind == "svg" else {"Software": None}
-    with atomic_path(picture) as aside:
-        figure.savefig(aside, format=kind, dpi=110, metadata=still)
+    still: dict[str, None] = {"Date": None} if picture.suffix.lower() == ".svg" else {"Software": None}
+    figure.savefig(picture, dpi=110, metadata=still)

@@ -45,13 +45,17 @@ def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
     FileError
         Before the body when a file cannot be made there; after it when it cannot be put in place.
     """
+    with _made_folders(*paths), _put_aside(*paths) as asides:
+        yield asides
+
+
+@contextmanager
+def _put_aside(*paths: Path) -> Iterator[tuple[Path, ...]]:
     asides = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
     made: list[Path] = []
-    folders: list[Path] = []
     try:
         for path, aside in zip(paths, asides, strict=True):
             with naming(path):
-                _make_folders(path.parent, folders)
                 if path.is_dir():
                     raise IsADirectoryError(errno.EISDIR, "is a folder")
                 made.append(aside)
@@ -65,21 +69,33 @@ def atomic_paths(*paths: Path) -> Iterator[tuple[Path, ...]]:
                 aside.replace(path)
                 made[made.index(aside)] = path
         made.clear()
-        folders.clear()
     finally:
         for leftover in made:
             with suppress(OSError):
                 leftover.unlink()
-        for folder in reversed(folders):
+
+
+@contextmanager
+def _made_folders(*paths: Path) -> Iterator[None]:
+    """Make the folders of `paths`; when the body fails, those that were made and are empty go again."""
+    made: list[Path] = []
+    try:
+        for path in paths:
+            with naming(path):
+                _make_folder(path.parent, made)
+        yield
+        made.clear()
+    finally:
+        for folder in reversed(made):
             with suppress(OSError):
                 folder.rmdir()
 
 
-def _make_folders(folder: Path, made: list[Path]) -> None:
+def _make_folder(folder: Path, made: list[Path]) -> None:
     """Make `folder` and what it lies in, where missing; each that is made is noted in `made`."""
     if folder.exists():
         return
-    _make_folders(folder.parent, made)
+    _make_folder(folder.parent, made)
     with suppress(FileExistsError):
         folder.mkdir()
         made.append(folder)
