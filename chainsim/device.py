@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
@@ -298,7 +297,7 @@ def load_device(name: str) -> Device:
     if name in device_names():
         return read_model(PROFILES / f"{name}.yaml", Device)
     path = Path(name)
-    if path.suffix.lower() in {".yaml", ".yml"} or os.path.isfile(name):
+    if path.suffix.lower() in {".yaml", ".yml"}:
         return read_model(path, Device)
     close = get_close_matches(name.casefold(), device_names(), n=1)
     meant = f"; did you mean {close[0]}?" if close else ""

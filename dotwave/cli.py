@@ -8,6 +8,7 @@ SIGTERM. Imports that take time stay inside the commands.
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from io import TextIOWrapper
@@ -243,8 +244,15 @@ def _terminate(number: int, _frame: object) -> NoReturn:
     raise Terminated(128 + number)
 
 
+def _speak_utf8() -> None:
+    """Start again in UTF-8 where names of files could only be ASCII (a C locale, and Python told to keep to it)."""
+    if sys.getfilesystemencoding() == "ascii":
+        os.execv(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]])
+
+
 def main() -> None:
     """Entry point: runs the command and turns what went wrong into an exit code."""
+    _speak_utf8()
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _terminate)

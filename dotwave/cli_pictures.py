@@ -129,6 +129,9 @@ def render(
         ),
     ],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    root: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Refuse a job that leads out of this folder; for jobs of others.")
+    ] = None,
     tol: Tol = None,
     budget: Budget = None,
     explain: Explain = False,
@@ -138,7 +141,8 @@ def render(
     """Render a sequence of texts, pictures, icons, textures and pauses.
 
     Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol and --budget come before
-    what the job says.
+    what the job says. With --root the job, every file it names and its output lie below a folder, links followed, and
+    its tables are liblouis's own.
 
     \b
     Example:
@@ -149,7 +153,7 @@ def render(
     from .study import Study
 
     study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
-    report = render_job(job, output, study)
+    report = render_job(job, output, study, root=root)
     told = study.told(report, report.ok)
     finish(told, as_json, ok=told.ok)
 

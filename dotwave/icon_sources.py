@@ -72,9 +72,14 @@ def find_icons(sources: Sequence[str]) -> tuple[IconPlace, ...]:
 
 def _name(place: IconPlace, several: bool) -> str:
     if not place.member:
-        return place.container.name
+        return _text(place.container.name)
     parts = [part for part in PurePosixPath(place.member).parts if part not in {"/", ".."}]
-    return "/".join([place.container.name, *parts] if several else parts)
+    return _text("/".join([place.container.name, *parts] if several else parts))
+
+
+def _text(name: str) -> str:
+    """A name to show and to write; bytes that are no UTF-8 are replaced."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def _paths(source: str) -> Iterable[Path]:

@@ -206,7 +206,7 @@ def test_simulate_prints_strict_json_and_says_ok_by_its_exit_code(dotwave, tmp_p
     first = 0.01 / (1 - 1.1**2 + 1j * 0.05 * 1.1)
     assert complex(*answer["phasor"][0]) == pytest.approx(first, rel=1e-9)
     assert dotwave("simulate", tmp_path / "missing.yaml").code == 2
-    monkeypatch.setattr(sys, "stdin", io.StringIO(chain.read_text()))
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(chain.read_bytes())))
     assert json.loads(dotwave("simulate", "-").out)["phasor"] == answer["phasor"]
     chain.write_text(setting.replace("beta: 0.0", "beta: -1.0").replace("0.01", "9.0") + "tol: 1.0e-6\n")
     escaped = dotwave("simulate", chain)

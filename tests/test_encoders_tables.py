@@ -3,11 +3,12 @@
 import subprocess
 import sys
 import types
+from pathlib import Path
 
 import pytest
 
 from encoders import LouisMissing, TableMissing, list_tables, louis_binding, resolve_tables
-from encoders.tables import hyphenation_tables, table_dots
+from encoders.tables import foreign_tables, hyphenation_tables, table_dots
 
 
 def test_tables_carry_metadata():
@@ -44,6 +45,11 @@ def test_specs(spec, tables):
         ("language:xx", "none answers the query"),
         ("", "empty"),
         (",", "no such table|does not compile"),
+        ("x" * 5000, "5000 characters; a name or list of names has at most 1000"),
+        ("en-ueb-g2.ctb\0.dic", "a character that no table's name has"),
+        ("\ud800.ctb", "a character that no table's name has"),
+        ("gr\xfc\xdfe.ctb", "'gr\xfc\xdfe.ctb': no such table"),
+        ("gr\udcfc.ctb", "a character that no table's name has"),
     ],
 )
 def test_a_wrong_table_is_one_line_with_the_nearest(spec, says):
@@ -55,9 +61,19 @@ def test_a_wrong_table_is_one_line_with_the_nearest(spec, says):
 def test_a_table_that_does_not_compile_says_why(tmp_path, capfd):
     path = tmp_path / "broken.utb"
     path.write_text("nonsense a b\n")
-    with pytest.raises(TableMissing, match=r"does not compile.*nonsense"):
+    with pytest.raises(TableMissing, match=r"does not compile: .*broken\.utb:1: expected a rule of liblouis") as caught:
         resolve_tables(str(path))
+    assert "nonsense" not in str(caught.value), "what stands in a file is told to nobody"
     assert capfd.readouterr() == ("", ""), "the library itself prints nothing"
+
+
+def test_tables_that_liblouis_did_not_bring_along(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert foreign_tables("en-ueb-g2.ctb, hyph_en_US.dic") == foreign_tables("language:de grade:2") == ()
+    assert foreign_tables("en-ueb-g2.ctb,./own.utb,../x") == ("./own.utb", "../x")
+    assert foreign_tables("/etc/passwd") == ("/etc/passwd",)
+    (tmp_path / "en-ueb-g2.ctb").touch()
+    assert foreign_tables("en-ueb-g2.ctb") == ("en-ueb-g2.ctb",), "liblouis would take the file of the current folder"
 
 
 def test_dots_of_tables():
@@ -67,7 +83,9 @@ def test_dots_of_tables():
 
 
 def test_hyphenation_dictionaries_are_found_by_language():
-    assert hyphenation_tables(("de-g2.ctb",)) == ("de-g2.ctb", "hyph_de_DE.dic")
+    table, dictionary = hyphenation_tables(("de-g2.ctb",))
+    assert (table, Path(dictionary).name) == ("de-g2.ctb", "hyph_de_DE.dic")
+    assert Path(dictionary).is_file(), "a file of that name in the current folder is not meant"
     assert hyphenation_tables(("ar-ar-g1.utb",)) == ()
     assert louis_binding.hyphenate(("en-ueb-g2.ctb", "hyph_en_US.dic"), "knowledgeable") == [5, 9]
 
