@@ -22,7 +22,7 @@ from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, say
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, say
 from .command import finish as _finish
 from .completion import completed_devices, completed_files
 from .ending import ended
@@ -82,6 +82,7 @@ def text(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
@@ -106,7 +107,7 @@ def text(
     )  # fmt: skip
     report = render_text(
         source, device=device, out=output, options=options, encoding=sample_format.value,
-        contrast_db=contrast, actuator=place_of(actuator), study=study,
+        contrast_db=contrast, actuator=place_of(actuator), study=study, yes=yes,
     )  # fmt: skip
     told = study.told(report, report.ok)
     _finish(told, as_json, ok=told.ok)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from .cli_help import RENDER
-from .command import Budget, Device, Explain, Json, Pareto, Tol, finish, say
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
 from .completion import completed_files
 from .options import SampleFormat
 
@@ -49,6 +49,7 @@ def image(
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render pictures, one after another, and write the waveforms that make them felt.
@@ -66,7 +67,7 @@ def image(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
     study = Study(asked_of(tol=tol, budget=budget))
-    how = Rendering(output, sample_format.value, contrast, study)
+    how = Rendering(output, sample_format.value, contrast, study, yes)
     report = render_images(files, device=device, options=options, how=how, explain=explain)
     told = study.told(report, report.ok)
     finish(told, as_json, ok=told.ok)
@@ -94,6 +95,7 @@ def icons(
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Encode and plan every icon; write manifest.json, manifest.csv, contact.png and index.html.
@@ -112,7 +114,7 @@ def icons(
     options = IconOptions(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
-        tol=asked.tol, budget_s=asked.budget_s,
+        tol=asked.tol, budget_s=asked.budget_s, yes=yes,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)
@@ -136,6 +138,7 @@ def render(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render a sequence of texts, pictures, icons, textures and pauses.
@@ -153,7 +156,7 @@ def render(
     from .study import Study
 
     study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
-    report = render_job(job, output, study, root=root)
+    report = render_job(job, output, study, root=root, yes=yes)
     told = study.told(report, report.ok)
     finish(told, as_json, ok=told.ok)
 

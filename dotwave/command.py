@@ -11,7 +11,9 @@ import typer
 from .completion import completed_devices, completed_files
 from .errors import AppError
 
-__all__ = ["Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "finish", "printable", "say"]
+__all__ = [
+    "Budget", "Device", "Explain", "Json", "Pareto", "Report", "Tol", "Written", "Yes", "finish", "printable", "say",
+]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Device = Annotated[
@@ -43,6 +45,7 @@ Pareto = Annotated[
     str | None,
     typer.Option(metavar="N|PICTURE|N:PICTURE", help="Also list what frame N (else 1) can be bought for; draw it."),
 ]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a file of more than 1 GB.")]
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 

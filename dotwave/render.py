@@ -14,6 +14,7 @@ from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
 from .asked import TOLERANCES
 from .errors import AppError
+from .extent import extent_of, go_on
 from .job_scene import read_job_scene
 from .progress import progress
 from .scene_report import SceneReport
@@ -30,16 +31,18 @@ class Rendering:
     Attributes
     ----------
     out : the .wav, None to plan only. study : what is asked beside, and what is seen of the plan; for one scene.
+    yes : do not ask before a very large file.
     """
 
     out: Path | None = None
     encoding: Encoding = "float32"
     contrast_db: float = DEFAULT_CONTRAST_DB
     study: Study = field(default_factory=Study)
+    yes: bool = False
 
 
 def render_job(
-    path: Path, out: Path | None = None, study: Study | None = None, *, root: Path | None = None
+    path: Path, out: Path | None = None, study: Study | None = None, *, root: Path | None = None, yes: bool = False
 ) -> SceneReport:
     """Carry out the job file `path`; `out` is written in place of the job's own output.
 
@@ -47,9 +50,12 @@ def render_job(
     ----------
     study : what is asked beside, before what the job asks for.
     root : the job, and what it names, lie below this folder, or are refused; None for anywhere.
+    yes : do not ask before a very large file.
 
     Raises
     ------
+    Declined
+        When a person was asked, and said no.
     AppError, ChainError, DriverError, EncodeError, PlanError
         When the job, or what it names, cannot be used.
     """
@@ -58,7 +64,7 @@ def render_job(
     job = found.job
     study = study or Study()
     study.otherwise(job.tol, job.budget.planning_s if job.budget else None)
-    how = Rendering(out or found.out, job.sample_format, job.contrast_db, study)
+    how = Rendering(out or found.out, job.sample_format, job.contrast_db, study, yes)
     try:
         with found.scene() as scene:
             report = render_scene(scene, found.device, how, [part.words for part in found.parts])
@@ -78,10 +84,14 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
 
     Raises
     ------
-    PlanError, DriverError
-        When the scene does not fit the device, or the disk refuses.
+    Declined
+        When a person was asked whether to write very much, and said no.
+    AppError, PlanError, DriverError
+        When the scene does not fit the device, or the disk has no room or refuses.
     """
     began = time.perf_counter()
+    if how.out is not None:
+        go_on(extent_of(scene.frames, device, how.out, how.encoding), how.out, yes=how.yes)
     how.study.limit = how.study.limit or TOLERANCES["normal"]
     watch = _Watch(plan_scene(scene, device, contrast_db=how.contrast_db), how)
     written: WrittenWaveform | None = None

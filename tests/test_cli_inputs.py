@@ -187,3 +187,16 @@ def test_icons_whose_names_are_no_text(tmp_path: Path, dotwave) -> None:
     ended = dotwave("icons", folder, "-o", tmp_path / "out", "--workers", 1)
     assert ended.code == 0, ended.err
     assert json.loads((tmp_path / "out" / "manifest.json").read_text(encoding="utf-8"))
+
+
+def test_a_waveform_that_is_not_there_is_named_as_it_was_asked_for(tmp_path: Path, dotwave, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert dotwave("text", "a", "-o", "x.wav").code == 0
+    for command in ("verify", "preview", "play"):
+        assert dotwave(command, "none.wav").err == "dotwave: none.wav: no such file; check the name\n"
+        assert dotwave(command, "none.json").err == "dotwave: none.json: no such file; check the name\n"
+    (tmp_path / "y.wav").write_bytes((tmp_path / "x.wav").read_bytes())
+    assert dotwave("verify", "y.wav").err == "dotwave: y.json: no such file; check the name\n"
+    (tmp_path / "x.wav").unlink()
+    assert dotwave("verify", "x.json").err == "dotwave: x.wav: no such file; check the name\n"
+    assert dotwave("verify", "x.wav").err == "dotwave: x.wav: no such file; check the name\n"
