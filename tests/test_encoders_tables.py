@@ -1,5 +1,6 @@
 """Finding liblouis, its tables, and saying what is missing."""
 
+import re
 import subprocess
 import sys
 import types
@@ -7,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from encoders import LouisMissing, TableMissing, list_tables, louis_binding, resolve_tables
+from encoders import LouisMissing, TableMissing, list_tables, louis_binding, louis_cure, resolve_tables
 from encoders.tables import foreign_tables, hyphenation_tables, table_dots
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_tables_carry_metadata():
@@ -104,8 +107,35 @@ def test_a_false_louis_is_passed_over(monkeypatch):
 def test_without_liblouis_the_cure_is_named(monkeypatch):
     monkeypatch.setattr(louis_binding, "_imported", lambda: None)
     monkeypatch.setattr(louis_binding, "_from_distribution", lambda: None)
-    with pytest.raises(LouisMissing, match="apt-get install python3-louis"):
+    with pytest.raises(LouisMissing, match=re.escape(louis_cure.install_words())):
         louis_binding._louis.__wrapped__()
+
+
+@pytest.mark.parametrize("tool", louis_cure.INSTALLERS)
+def test_the_cure_is_that_of_the_package_manager(monkeypatch, tool):
+    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: f"/bin/{name}" if name == tool else None)
+    assert louis_cure.install_words() == f"install it with: {louis_cure.INSTALLERS[tool]}"
+
+
+@pytest.mark.parametrize(("platform", "says"), [("darwin", "Homebrew"), ("win32", "wsl"), ("linux", "liblouis.io")])
+def test_without_a_package_manager_the_cure_is_that_of_the_system(monkeypatch, platform, says):
+    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: None)
+    monkeypatch.setattr(louis_cure.sys, "platform", platform)
+    assert says in louis_cure.install_words()
+    assert ("apt-get" in louis_cure.install_words()) == (platform == "win32")
+
+
+def test_run_names_the_same_cures():
+    lines = [line.strip() for line in (ROOT / "run").read_text(encoding="utf-8").splitlines()]
+    for tool, command in louis_cure.INSTALLERS.items():
+        if tool == "apt-get":
+            assert 'apt_install "$@"' in lines
+            assert 'has_louis || set -- "$@" python3-louis' in lines
+        else:
+            asked = next(number for number, line in enumerate(lines) if f"if command -v {tool} >" in line)
+            assert lines[asked + 1] == f"echo '{command}'"
+    for words in (louis_cure.ELSEWHERE["darwin"], louis_cure.UNKNOWN):
+        assert f"echo '{words}'" in lines
 
 
 def test_importing_encoders_is_light():
