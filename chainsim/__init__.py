@@ -11,7 +11,7 @@ from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
 from .rung import RUNGS, Rung, RungError, Start, load_rung
-from .yamlfile import parse_model, read_model
+from .yamlfile import Located, parse_model, read_located, read_model
 
 if TYPE_CHECKING:
     from .averaging.decide import Decision, decide
@@ -63,6 +63,7 @@ __all__ = [
     "Gradient",
     "GridError",
     "GridIntegrator",
+    "Located",
     "Mode",
     "Note",
     "Outcome",
@@ -102,6 +103,7 @@ __all__ = [
     "parse_simulation",
     "peak_gain",
     "reached_from_rest",
+    "read_located",
     "read_model",
     "read_simulation",
     "read_sweep",

@@ -3,23 +3,43 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
 from .errors import ProfileError
 
-__all__ = ["parse_model", "read_model"]
+__all__ = ["Located", "parse_model", "read_located", "read_model"]
 
 Model = TypeVar("Model", bound=BaseModel)
 Place = tuple[str | int, ...]
 MAX_BYTES = 4_000_000
 
 
+@dataclass(frozen=True)
+class Located(Generic[Model]):
+    """A model that was read, and the lines of its keys and items; `name` stands for the file in messages."""
+
+    name: str
+    model: Model
+    lines: Mapping[Place, int]
+
+    def at(self, *place: str | int) -> str:
+        """``file:line: key.key`` of a place in the model; the line is that of the innermost key the file has."""
+        return _at(self.name, self.lines, place)
+
+
 def read_model(path: Path, model: type[Model]) -> Model:
-    """Read the YAML file `path` as one `model`.
+    """Read the YAML file `path` as one `model`; raises as `read_located` does."""
+    return read_located(path, model).model
+
+
+def read_located(path: Path, model: type[Model]) -> Located[Model]:
+    """Read the YAML file `path` as one `model`, for complaints about it that come later.
 
     Raises
     ------
@@ -27,13 +47,14 @@ def read_model(path: Path, model: type[Model]) -> Model:
         When the file cannot be read, is not YAML, or does not fit the model.
     """
     try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise ProfileError(f"{path}: {error.strerror or error}") from None
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise ProfileError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(raw) > MAX_BYTES:
-        raise ProfileError(f"{path}: {len(raw)} bytes; such a file has at most {MAX_BYTES}")
+        raise ProfileError(f"{path}: more than {MAX_BYTES} bytes; such a file has at most so many")
     try:
-        return parse_model(raw.decode("utf-8-sig"), str(path), model)
+        return _parsed(raw.decode("utf-8-sig"), str(path), model)
     except UnicodeDecodeError as error:
         raise ProfileError(f"{path}: not UTF-8 at byte {error.start}; save it as UTF-8") from None
 
@@ -46,6 +67,10 @@ def parse_model(text: str, name: str, model: type[Model]) -> Model:
     ProfileError
         When the text is not YAML or does not fit the model.
     """
+    return _parsed(text, name, model).model
+
+
+def _parsed(text: str, name: str, model: type[Model]) -> Located[Model]:
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
         data = yaml.safe_load(text)
@@ -60,7 +85,7 @@ def parse_model(text: str, name: str, model: type[Model]) -> Model:
     if repeated is not None:
         raise ProfileError(f"{name}:{repeated}: a key is given twice in the same section; keep one")
     try:
-        return model.model_validate(data)
+        return Located(name, model.model_validate(data), lines)
     except ValidationError as error:
         raise ProfileError(_model_complaint(name, lines, error)) from None
 
@@ -103,11 +128,14 @@ def _model_complaint(name: str, lines: dict[Place, int], error: ValidationError)
     # Where a number or a list fits, both complain: the one that points into the list knows more.
     top = complaints[0][0]
     place, first = max((one for one in complaints if one[0][: len(top)] == top), key=lambda one: len(one[0]))
+    return f"{_at(name, lines, place)}: {_sentence(first)}"
+
+
+def _at(name: str, lines: Mapping[Place, int], place: Place) -> str:
     known = place
     while known and known not in lines:
         known = known[:-1]
-    field = ".".join(str(part) for part in place) or "file"
-    return f"{name}:{lines.get(known, 1)}: {field}: {_sentence(first)}"
+    return f"{name}:{lines.get(known, 1)}: {'.'.join(map(str, place)) or 'file'}"
 
 
 def _place(location: Place) -> Place:

@@ -1,12 +1,14 @@
 """The command line: reads arguments, calls one function, prints.
 
-Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input, with one line
-on stderr; 130 after Ctrl-C; 143 after SIGTERM. Imports that take time stay inside the commands.
+Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input or circumstances, with
+one line on stderr; 70 a fault of the program; 130 after Ctrl-C; 141 when nobody reads the output any more; 143 after
+SIGTERM. Imports that take time stay inside the commands.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from io import TextIOWrapper
@@ -15,13 +17,16 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from .cli_help import LOOK, RENDER, SET_UP, STUDY, Commands
 from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, printable
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, say
 from .command import finish as _finish
-from .errors import Terminated, bad_input
+from .completion import completed_devices, completed_files
+from .ending import ended
+from .errors import Terminated
 from .options import Dots, Presentation, SampleFormat, Undefined
 
 __all__ = ["app", "main"]
@@ -30,7 +35,7 @@ app = typer.Typer(
     name="dotwave",
     help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
     no_args_is_help=True,
-    add_completion=False,
+    cls=Commands,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -39,9 +44,16 @@ app = typer.Typer(
 GAP = "in actuators."
 
 
-@app.command(short_help="Render text as Braille that can be felt.")
+@app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
 def text(
-    source: Annotated[str, typer.Argument(metavar="TEXT|FILE|-", help="A file if it exists, - for stdin, else words.")],
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="TEXT|FILE|-",
+            help="A file if it exists, - for stdin, else words.",
+            autocompletion=completed_files(".txt", ".brf", ".brl"),
+        ),
+    ],
     device: Device = "paper-6x6",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
@@ -70,6 +82,7 @@ def text(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
@@ -94,17 +107,23 @@ def text(
     )  # fmt: skip
     report = render_text(
         source, device=device, out=output, options=options, encoding=sample_format.value,
-        contrast_db=contrast, actuator=place_of(actuator), study=study,
+        contrast_db=contrast, actuator=place_of(actuator), study=study, yes=yes,
     )  # fmt: skip
     told = study.told(report, report.ok)
     _finish(told, as_json, ok=told.ok)
 
 
-@app.command(short_help="Solve one chain and print its steady state.")
+@app.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
 def simulate(
     chain: Annotated[
-        str, typer.Argument(metavar="CHAIN.yaml", help="The chain, its setting and a tolerance; - is stdin.")
+        str,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, its setting and a tolerance; - is stdin.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
     ],
+    as_json: Annotated[bool, typer.Option("--json", help="As without it: the answer is JSON.")] = False,
 ) -> None:
     """Solve a chain of coupled oscillators and print what it does, as JSON.
 
@@ -120,11 +139,11 @@ def simulate(
     from .source import simulation_source
 
     answer = solve(simulation_source(chain))
-    typer.echo(json.dumps(answer, allow_nan=False))
+    say(json.dumps(answer, allow_nan=False))
     raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
 
 
-@app.command(short_help="Say what a written waveform makes felt.")
+@app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)
 def verify(out: Written, as_json: Json = False) -> None:
     """Integrate the full equations under the samples of a written waveform and say what is felt.
 
@@ -141,7 +160,7 @@ def verify(out: Written, as_json: Json = False) -> None:
     _finish(report, as_json, ok=report.ok)
 
 
-@app.command(short_help="Draw and spell out what a written waveform makes felt.")
+@app.command(short_help="Draw and spell out what a written waveform makes felt.", rich_help_panel=LOOK)
 def preview(
     out: Written,
     output: Annotated[
@@ -165,9 +184,12 @@ def preview(
     _finish(report, as_json, ok=True)
 
 
-@app.command(short_help="List device profiles, or print one.")
+@app.command(short_help="List device profiles, or print one.", rich_help_panel=SET_UP)
 def devices(
-    name: Annotated[str | None, typer.Argument(help="One profile, or a YAML file: print every value.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="One profile, or a YAML file: print every value.", autocompletion=completed_devices),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List the built-in device profiles, with the values that are assumed rather than given.
@@ -181,7 +203,7 @@ def devices(
     _finish(list_devices(name), as_json, ok=True)
 
 
-@app.command(short_help="List translation tables.")
+@app.command(short_help="List translation tables.", rich_help_panel=SET_UP)
 def tables(
     wanted: Annotated[
         str | None, typer.Argument(metavar="FILTER", help="Part of a file name, language or name.")
@@ -199,7 +221,7 @@ def tables(
     _finish(list_translation_tables(wanted), as_json, ok=True)
 
 
-@app.command(short_help="Check this installation.")
+@app.command(short_help="Check this installation.", rich_help_panel=SET_UP)
 def doctor(as_json: Json = False) -> None:
     """Check Python, the packages, liblouis, the cache and the disk, and name the cure for what is wrong.
 
@@ -223,8 +245,15 @@ def _terminate(number: int, _frame: object) -> NoReturn:
     raise Terminated(128 + number)
 
 
+def _speak_utf8() -> None:
+    """Start again in UTF-8 where names of files could only be ASCII (a C locale, and Python told to keep to it)."""
+    if sys.getfilesystemencoding() == "ascii":
+        os.execv(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]])
+
+
 def main() -> None:
     """Entry point: runs the command and turns what went wrong into an exit code."""
+    _speak_utf8()
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _terminate)
@@ -232,12 +261,4 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             # A terminal that cannot show Braille gets escapes, not a traceback.
             stream.reconfigure(errors="backslashreplace")
-    try:
-        app(prog_name="dotwave")
-    except SystemExit:
-        raise
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except bad_input() as error:
-        typer.echo(f"dotwave: {printable(' '.join(str(error).split()))}", err=True)
-        sys.exit(2)
+    sys.exit(ended(lambda: app(prog_name="dotwave")))

@@ -8,21 +8,32 @@ from typing import Annotated
 
 import typer
 
-from .command import Budget, Device, Explain, Json, Pareto, Tol, finish
+from .cli_help import RENDER
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
+from .completion import completed_files
 from .options import SampleFormat
 
 __all__ = ["picture_app"]
 
 picture_app = typer.Typer(rich_markup_mode=None)
 
+PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
+ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
 Contrast = Annotated[
     float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
 ]
 
 
-@picture_app.command(short_help="Render pictures as patterns that can be felt.")
+@picture_app.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
 def image(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.",
+            autocompletion=completed_files(*PICTURES),
+        ),
+    ],
     device: Device = "paper-6x6",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
     explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
@@ -38,6 +49,7 @@ def image(
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render pictures, one after another, and write the waveforms that make them felt.
@@ -55,16 +67,21 @@ def image(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
     study = Study(asked_of(tol=tol, budget=budget))
-    how = Rendering(output, sample_format.value, contrast, study)
+    how = Rendering(output, sample_format.value, contrast, study, yes)
     report = render_images(files, device=device, options=options, how=how, explain=explain)
     told = study.told(report, report.ok)
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Render a set of icons and tell them apart.")
+@picture_app.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
 def icons(
     sources: Annotated[
-        list[str], typer.Argument(metavar="DIR|GLOB|ARCHIVE...", help="Folders, globs, zip or tar archives.")
+        list[str],
+        typer.Argument(
+            metavar="DIR|GLOB|ARCHIVE...",
+            help="Folders, globs, zip or tar archives.",
+            autocompletion=completed_files(*PICTURES, *ARCHIVES),
+        ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
     device: Device = "paper-6x6",
@@ -78,6 +95,7 @@ def icons(
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Encode and plan every icon; write manifest.json, manifest.csv, contact.png and index.html.
@@ -96,26 +114,38 @@ def icons(
     options = IconOptions(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
-        tol=asked.tol, budget_s=asked.budget_s,
+        tol=asked.tol, budget_s=asked.budget_s, yes=yes,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)
 
 
-@picture_app.command(short_help="Carry out a job file.")
+@picture_app.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
 def render(
-    job: Annotated[Path, typer.Argument(metavar="JOB.yaml", help="Device, tolerance, output and a sequence.")],
+    job: Annotated[
+        Path,
+        typer.Argument(
+            metavar="JOB.yaml",
+            help="Device, tolerance, output and a sequence.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    root: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Refuse a job that leads out of this folder; for jobs of others.")
+    ] = None,
     tol: Tol = None,
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render a sequence of texts, pictures, icons, textures and pauses.
 
     Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol and --budget come before
-    what the job says.
+    what the job says. With --root the job, every file it names and its output lie below a folder, links followed, and
+    its tables are liblouis's own.
 
     \b
     Example:
@@ -126,12 +156,12 @@ def render(
     from .study import Study
 
     study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
-    report = render_job(job, output, study)
+    report = render_job(job, output, study, root=root, yes=yes)
     told = study.told(report, report.ok)
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Print the JSON Schema of job files.")
+@picture_app.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them.
 
@@ -141,4 +171,4 @@ def schema() -> None:
     """
     from .job import job_schema
 
-    typer.echo(json.dumps(job_schema(), indent=2))
+    say(json.dumps(job_schema(), indent=2))

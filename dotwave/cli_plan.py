@@ -7,20 +7,35 @@ from typing import Annotated
 
 import typer
 
+from .cli_help import STUDY
 from .command import Json, finish
+from .completion import completed_devices, completed_files
 
 __all__ = ["plan_app"]
 
 plan_app = typer.Typer(rich_markup_mode=None)
 
-Source = Annotated[str, typer.Argument(metavar="JOB.yaml|TEXT|FILE|-", help="A job file, or a text as `dotwave text`.")]
+Source = Annotated[
+    str,
+    typer.Argument(
+        metavar="JOB.yaml|TEXT|FILE|-",
+        help="A job file, or a text as `dotwave text`.",
+        autocompletion=completed_files(".yaml", ".yml", ".txt", ".brf", ".brl"),
+    ),
+]
 Profile = Annotated[
-    str | None, typer.Option("--device", "-d", help="A profile or YAML file; default: the job's own, or paper-6x6.")
+    str | None,
+    typer.Option(
+        "--device",
+        "-d",
+        help="A profile or YAML file; default: the job's own, or paper-6x6.",
+        autocompletion=completed_devices,
+    ),
 ]
 Picture = Annotated[Path | None, typer.Option("--picture", help="Also a picture, .png or .svg.")]
 
 
-@plan_app.command(short_help="Say which terms of the model a scene needs, and why.")
+@plan_app.command(short_help="Say which terms of the model a scene needs, and why.", rich_help_panel=STUDY)
 def explain(
     source: Source,
     device: Profile = None,
@@ -40,7 +55,7 @@ def explain(
     finish(run(source, device=device, tol=tol), as_json, ok=True)
 
 
-@plan_app.command(short_help="Measure speed against accuracy on a scene.")
+@plan_app.command(short_help="Measure speed against accuracy on a scene.", rich_help_panel=STUDY)
 def tradeoff(
     source: Source,
     device: Profile = None,
@@ -65,12 +80,17 @@ def tradeoff(
     finish(report, as_json, ok=report.ok)
 
 
-@plan_app.command(short_help="Trade error, time, drive and robustness of one frame.")
+@plan_app.command(short_help="Trade error, time, drive and robustness of one frame.", rich_help_panel=STUDY)
 def pareto(
     source: Source,
     device: Annotated[
         str | None,
-        typer.Option("--device", "-d", help="A profile or YAML file; default: the job's own, or linked-6x6."),
+        typer.Option(
+            "--device",
+            "-d",
+            help="A profile or YAML file; default: the job's own, or linked-6x6.",
+            autocompletion=completed_devices,
+        ),
     ] = None,
     frame: Annotated[int, typer.Option(min=1, help="Which frame of the scene, from 1.")] = 1,
     picture: Picture = None,

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from .cli_help import PLAY
 from .command import Device, Json, Written, finish
 
 __all__ = ["play_app"]
@@ -28,7 +29,7 @@ class BoardFirmware(StrEnum):
     CORRECTED = "corrected"
 
 
-@play_app.command(short_help="Play a written waveform on hardware.")
+@play_app.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
 def play(
     out: Written,
     port: Annotated[str | None, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")] = None,
@@ -61,7 +62,7 @@ def play(
     finish(report, as_json, ok=report.ok)
 
 
-@play_app.command(short_help="List serial ports.")
+@play_app.command(short_help="List serial ports.", rich_help_panel=PLAY)
 def ports(as_json: Json = False) -> None:
     """List the serial ports of this machine.
 
@@ -74,7 +75,7 @@ def ports(as_json: Json = False) -> None:
     finish(list_ports(), as_json, ok=True)
 
 
-@play_app.command(short_help="Stand in for a controller.")
+@play_app.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
 def emulate(
     device: Device = "paper-6x6",
     link: Annotated[Path | None, typer.Option(help="A stable name for the port (a symbolic link).")] = None,

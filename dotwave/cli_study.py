@@ -7,16 +7,25 @@ from typing import Annotated
 
 import typer
 
+from .cli_help import STUDY
 from .command import Device, Json, finish
+from .completion import completed_files
 
 __all__ = ["study_app"]
 
 study_app = typer.Typer(rich_markup_mode=None)
 
 
-@study_app.command(short_help="Solve one chain at many settings.")
+@study_app.command(short_help="Solve one chain at many settings.", rich_help_panel=STUDY)
 def sweep(
-    chain: Annotated[Path, typer.Argument(metavar="CHAIN.yaml", help="The chain, ranges of its setting, a tolerance.")],
+    chain: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, ranges of its setting, a tolerance.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The .npz or .csv to write.")],
     only: Annotated[str | None, typer.Option(help="Fields to write, with commas between; default: all.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Also a map of two ranges, as PNG (needs an .npz).")] = None,
@@ -42,7 +51,7 @@ def sweep(
     finish(report, as_json, ok=True)
 
 
-@study_app.command(short_help="Measure the solvers against others, on this machine.")
+@study_app.command(short_help="Measure the solvers against others, on this machine.", rich_help_panel=STUDY)
 def bench(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for bench.json and bench.svg.")] = Path(
         "out/bench"
@@ -63,9 +72,16 @@ def bench(
     finish(run_bench(output, quick=quick), as_json, ok=True)
 
 
-@study_app.command(short_help="Fit the actuators of a device to measured frequency sweeps.")
+@study_app.command(short_help="Fit the actuators of a device to measured frequency sweeps.", rich_help_panel=STUDY)
 def calibrate(
-    sweep: Annotated[str, typer.Argument(metavar="SWEEP.csv", help="The measured points; - is standard input.")],
+    sweep: Annotated[
+        str,
+        typer.Argument(
+            metavar="SWEEP.csv",
+            help="The measured points; - is standard input.",
+            autocompletion=completed_files(".csv"),
+        ),
+    ],
     device: Device = "linked-6x6",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .yaml to write; none: fit only.")] = None,
     lam: Annotated[float | None, typer.Option(help="What every link was set to during the sweep.")] = None,

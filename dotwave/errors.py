@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["AppError", "Terminated", "bad_input"]
+__all__ = ["AppError", "Declined", "Terminated", "bad_input"]
 
 
 class AppError(Exception):
@@ -11,6 +11,13 @@ class AppError(Exception):
     Examples: an argument looks like a file that does not exist; a picture cannot be written because
     its folder is read-only.
     """
+
+
+class Declined(SystemExit):
+    """A person was asked whether to go on, and said no; the exit code is 1."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
 
 
 class Terminated(SystemExit):

@@ -40,7 +40,7 @@ class IconOptions:
     workers : processes, None for one a core. scheduler : address of a dask scheduler to work there instead.
     closer_than : pairs of icons nearer than this are listed. dwell_s : length of a waveform's frame.
     tol : largest predicted error of an icon that is ok, full scale; None for any. budget_s : seconds for the work on
-        the set; what is not begun then is left for the next run. None for any.
+        the set; what is not begun then is left for the next run. None for any. yes : do not ask before very much.
     """
 
     device: str = "paper-6x6"
@@ -54,6 +54,7 @@ class IconOptions:
     encoding: Encoding = "float32"
     tol: float | None = None
     budget_s: float | None = None
+    yes: bool = False
 
 
 @dataclass
@@ -151,8 +152,6 @@ class IconRun:
             self.failed[name] = record["bad"]
             return
         path = self.out / "waveforms" / f"{name}.wav"
-        with naming(path.parent):
-            path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_files(path, path.with_suffix(".json")) as (wav, manifest), naming(path):
             wav.write(record["wav"])
             manifest.write(record["json"])

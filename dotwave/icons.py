@@ -6,10 +6,13 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from chainsim import load_device
 from drivers import naming
-from encoders import PictureOptions
+from encoders import Frame, PictureOptions, TargetPattern
 
+from .extent import extent_of, go_on
 from .icon_journal import Journal
 from .icon_pool import ClusterPool, LocalPool, Pool
 from .icon_report import IconsReport, write_report
@@ -43,6 +46,9 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
     )
     recipe = Recipe(device, picture, options.contrast_db, options.encoding, code_digest())
     places = find_icons(sources)
+    if options.waveforms:
+        blank = Frame(TargetPattern(np.zeros((device.rows, device.cols), np.complex128)), options.dwell_s)
+        go_on(extent_of([blank], device, Path("icon.wav"), options.encoding, len(places)), out, yes=options.yes)
     with naming(out):
         out.mkdir(parents=True, exist_ok=True)
     pool: Pool = ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers)

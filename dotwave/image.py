@@ -26,7 +26,8 @@ from encoders import (
 )  # fmt: skip
 
 from .errors import AppError
-from .render import Rendering, Shown, joined, picture_words, render_scene
+from .job_scene import Shown, joined, picture_words
+from .render import Rendering, render_scene
 from .scene_report import SceneReport
 
 __all__ = ["picture_options", "render_images"]

@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, field_validator, model_validator
 
-from chainsim import Amplifier, Coupling, Device, Span, load_device, read_model
+from chainsim import Amplifier, Coupling, Device, Located, Span, load_device, read_located
 from encoders import Fit, Invert, Output, PictureOptions, Presentation, RegionsBy, Style, Threshold, Undefined
 
 from .asked import TOLERANCES
+from .job_paths import FilePath
 from .job_texture import NotNegative, Part, Positive, Seconds, TexturePart
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "PicturePart",
     "TextPart",
     "job_schema",
+    "locate_job",
     "read_job",
 ]
 
@@ -67,7 +69,7 @@ class DevicePart(Part):
     A grid with another number of columns keeps one chain a row where the base has that.
     """
 
-    base: str = "paper-6x6"
+    base: FilePath = "paper-6x6"
     name: str | None = None
     grid: GridPart | None = None
     chain_length: Count | None = None
@@ -88,9 +90,14 @@ class DevicePart(Part):
 
     @model_validator(mode="after")
     def _builds(self) -> DevicePart:
-        if not Path(self.base).suffix:
+        if not self.in_file:
             self.device(Path())
         return self
+
+    @property
+    def in_file(self) -> bool:
+        """Whether the base is a profile's file, and not the name of one that is built in."""
+        return Path(self.base).suffix.lower() in {".yaml", ".yml"}
 
     def device(self, folder: Path) -> Device:
         """The device; a profile's file is looked for from `folder`.
@@ -100,8 +107,16 @@ class DevicePart(Part):
         ValueError
             When there is no such base, or the result contradicts itself.
         """
-        path = folder / self.base
-        base = load_device(str(path) if Path(self.base).suffix or path.is_file() else self.base)
+        return self.on(load_device(str(folder / self.base) if self.in_file else self.base))
+
+    def on(self, base: Device) -> Device:
+        """`base` with what is different from it.
+
+        Raises
+        ------
+        ValueError
+            When the result contradicts itself.
+        """
         given = self.model_dump(exclude_none=True, exclude={"base"}, by_alias=True)
         grid = given.pop("grid", {})
         if base.chain_length == base.cols and "cols" in grid:
@@ -121,7 +136,7 @@ class TextPart(Part):
     """Words, or a file of them, as Braille; the rest as `dotwave text` has it."""
 
     say: str | None = None
-    file: str | None = None
+    file: FilePath | None = None
     table: str = "en-ueb-g2.ctb"
     undefined: Undefined = Undefined.NAME
     cell_gap: Annotated[int, Field(ge=0)] = 0
@@ -144,7 +159,7 @@ class TextPart(Part):
 class PicturePart(Part):
     """A picture; the options are those of `encoders.PictureOptions`."""
 
-    file: str
+    file: FilePath
     style: Style = Style.AUTO
     background: Colour = "auto"
     crop: bool | None = None
@@ -193,6 +208,11 @@ class Item(Part):
             raise ValueError(f"give exactly one of {', '.join(type(self).model_fields)}")
         return self
 
+    @property
+    def kind(self) -> str:
+        """The key that is given."""
+        return next(name for name, value in self if value is not None)
+
 
 def _tolerance(value: Any) -> Any:
     if isinstance(value, str) and value in TOLERANCES:
@@ -230,7 +250,7 @@ class Job(Part):
     budget: Budget | None = None
     contrast_db: Annotated[float, Field(ge=6, le=60)] = 20.0
     presentation: Presentation = Presentation.TOGETHER
-    output: str | None = None
+    output: FilePath | None = None
     sample_format: Literal["float32", "pcm24"] = "float32"
     sequence: Annotated[tuple[Item, ...], Field(json_schema_extra={"minItems": 1})]
 
@@ -255,7 +275,12 @@ def read_job(path: Path) -> Job:
     chainsim.ProfileError
         When it cannot be read or does not fit: ``job.yaml:14: device.grid.rows: expected ...``.
     """
-    return read_model(path, Job)
+    return locate_job(path).model
+
+
+def locate_job(path: Path) -> Located[Job]:
+    """Read a job file, with the lines that everything in it stands in; raises as `read_job` does."""
+    return read_located(path, Job)
 
 
 def job_schema() -> dict[str, Any]:

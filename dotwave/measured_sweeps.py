@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from chainsim import Device
 
 from .errors import AppError
+from .source import standard_input
 
 if TYPE_CHECKING:
     from planner import Sweep
@@ -72,7 +72,7 @@ def read_sweeps(source: str, device: Device) -> dict[ChainPlace, Sweep]:
 
 def _text(source: str) -> str:
     try:
-        raw = sys.stdin.buffer.read(MAX_BYTES + 1) if source == "-" else _file(Path(source))
+        raw = standard_input().read(MAX_BYTES + 1) if source == "-" else _file(Path(source))
         if len(raw) > MAX_BYTES:
             raise AppError(f"{source}: more than {MAX_BYTES} bytes; sweep fewer points, or a row at a time")
         return raw.decode("utf-8-sig")

@@ -12,6 +12,7 @@ from drivers import EXCHANGE_SUFFIXES, Encoding, WrittenWaveform, write_exchange
 from encoders import EncodingReport, GridShape, TextFrames, TextOptions, TextScene, encode_text
 from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
+from .extent import extent_of, go_on
 from .progress import progress
 from .report import TextReport
 from .source import text_source
@@ -34,6 +35,7 @@ def render_text(
     contrast_db: float = DEFAULT_CONTRAST_DB,
     actuator: tuple[int, int] | None = None,
     study: Study | None = None,
+    yes: bool = False,
 ) -> TextReport:
     """Encode text, plan it on a device and, with `out`, write the waveform.
 
@@ -46,10 +48,12 @@ def render_text(
     out : samples (.wav, .npz, .csv, .raw) or a haptic file (.hjif, .ahap, .haptic).
     actuator : (row, col) that an .ahap or .haptic shows; None is the mean over the grid.
     contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
-    study : what is asked beside, and what is seen of the plan.
+    study : what is asked beside, and what is seen of the plan. yes : do not ask before a very large file.
 
     Raises
     ------
+    Declined
+        When a person was asked, and said no.
     EncodeError, ChainError, PlanError, DriverError, AppError
         When something that was given cannot be used.
     """
@@ -58,6 +62,8 @@ def render_text(
     text = text_source(source)
     scene = encode_text(text, GridShape(profile.rows, profile.cols), options)
     plan = plan_scene(scene, profile, contrast_db=contrast_db)
+    if out is not None and out.suffix.lower() not in EXCHANGE_SUFFIXES:
+        go_on(extent_of(scene.frames, profile, out, encoding), out, yes=yes)
     watch = _Watch(plan, study or Study(), stop_at_failure=out is not None)
     written: WrittenWaveform | None = None
     with progress("rendering") as update:

@@ -1,49 +1,27 @@
-"""Scenes and job files to waveforms: plan every frame, write what can be made, say what cannot."""
+"""Scenes and jobs to waveforms: plan every frame, write what can be made, say what cannot."""
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from chainsim import Device, Outcome
-from drivers import Encoding, WrittenWaveform, naming, write_waveform
-from encoders import (
-    EncodeError,
-    Frame,
-    GridShape,
-    Scene,
-    Style,
-    TargetPattern,
-    TextOptions,
-    TextSource,
-    encode_picture,
-    encode_text,
-)
+from drivers import Encoding, FileError, WrittenWaveform, write_waveform
+from encoders import Scene
 from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
 from .asked import TOLERANCES
 from .errors import AppError
-from .job import Item, Job, PicturePart, TextPart, read_job
+from .extent import extent_of, go_on
+from .job_scene import read_job_scene
 from .progress import progress
 from .scene_report import SceneReport
 from .study import Study
 from .tally import PlanStopped, Tally, nearest_lines, peak_volts
 
-__all__ = ["Rendering", "Shown", "joined", "picture_words", "render_job", "render_scene"]
-
-
-@dataclass(frozen=True)
-class Shown:
-    """One part of a sequence: its scene, and a line that says what it is."""
-
-    scene: Scene
-    words: str
+__all__ = ["Rendering", "render_job", "render_scene"]
 
 
 @dataclass(frozen=True)
@@ -53,112 +31,48 @@ class Rendering:
     Attributes
     ----------
     out : the .wav, None to plan only. study : what is asked beside, and what is seen of the plan; for one scene.
+    yes : do not ask before a very large file.
     """
 
     out: Path | None = None
     encoding: Encoding = "float32"
     contrast_db: float = DEFAULT_CONTRAST_DB
     study: Study = field(default_factory=Study)
+    yes: bool = False
 
 
-def render_job(path: Path, out: Path | None = None, study: Study | None = None) -> SceneReport:
+def render_job(
+    path: Path, out: Path | None = None, study: Study | None = None, *, root: Path | None = None, yes: bool = False
+) -> SceneReport:
     """Carry out the job file `path`; `out` is written in place of the job's own output.
 
-    `study` : what is asked beside, before what the job asks for.
+    Parameters
+    ----------
+    study : what is asked beside, before what the job asks for.
+    root : the job, and what it names, lie below this folder, or are refused; None for anywhere.
+    yes : do not ask before a very large file.
 
     Raises
     ------
+    Declined
+        When a person was asked, and said no.
     AppError, ChainError, DriverError, EncodeError, PlanError
         When the job, or what it names, cannot be used.
     """
     began = time.perf_counter()
-    job, folder = read_job(path), path.parent
-    try:
-        device = job.device.device(folder)
-    except ValueError as error:
-        raise AppError(f"{path}: device: {error}") from None
-    shape = GridShape(device.rows, device.cols)
-    parts = []
-    for number, item in enumerate(job.sequence):
-        try:
-            parts.append(_shown(item, job, device, shape, folder))
-        except EncodeError as error:
-            raise AppError(f"{path}: sequence.{number}: {error}") from None
-    if out is None and job.output is not None:
-        out = Path(os.path.normpath(folder / job.output))
-        with naming(out.parent):
-            out.parent.mkdir(parents=True, exist_ok=True)
+    found = read_job_scene(path, root=root)
+    job = found.job
     study = study or Study()
     study.otherwise(job.tol, job.budget.planning_s if job.budget else None)
-    how = Rendering(out, job.sample_format, job.contrast_db, study)
-    report = render_scene(joined(parts, shape), device, how, [part.words for part in parts])
+    how = Rendering(out or found.out, job.sample_format, job.contrast_db, study, yes)
+    try:
+        with found.scene() as scene:
+            report = render_scene(scene, found.device, how, [part.words for part in found.parts])
+    except FileError as error:
+        if out is not None:
+            raise
+        raise AppError(f"{found.located.at('output')}: {error}") from None
     return replace(report, seconds=time.perf_counter() - began)
-
-
-def _shown(item: Item, job: Job, device: Device, shape: GridShape, folder: Path) -> Shown:
-    if item.text is not None:
-        return _text(item.text, job, shape, folder)
-    if item.image is not None:
-        return _picture(item.image, device, shape, folder)
-    if item.icon is not None:
-        chosen = item.icon if item.icon.style is not Style.AUTO else item.icon.model_copy(update={"style": Style.ICON})
-        return _picture(chosen, device, shape, folder)
-    if item.texture is not None:
-        kind = next(name for name, value in item.texture if value is not None)
-        return _still(item.texture.target(shape), item.texture.dwell_s, f"texture: {kind}")
-    assert item.pause_s is not None
-    blank = np.zeros((shape.rows, shape.cols), np.complex128)
-    blank.flags.writeable = False
-    return _still(TargetPattern(blank), item.pause_s, f"pause of {item.pause_s:g} s")
-
-
-def _text(part: TextPart, job: Job, shape: GridShape, folder: Path) -> Shown:
-    given = part.model_dump(exclude={"say", "file"})
-    given["presentation"] = part.presentation or job.presentation
-    source = TextSource.of_path(folder / part.file) if part.file is not None else TextSource.of_text(part.say or "")
-    words = source.text if len(source.text) <= 40 else source.text[:37] + "..."
-    return Shown(encode_text(source, shape, TextOptions(**given)), f"text: {words}")
-
-
-def _picture(part: PicturePart, device: Device, shape: GridShape, folder: Path) -> Shown:
-    scene = encode_picture(folder / part.file, shape, part.options(device.pitch_m))
-    return Shown(scene, picture_words(scene.report))
-
-
-def picture_words(report: Any) -> str:
-    """One line on an encoded picture (`encoders.PictureReport`): file, style, similarity, what was left out."""
-    frames = f", {len(report.frames)} frames" if len(report.frames) > 1 else ""
-    notes = f" ({'; '.join(report.notes)})" if report.notes else ""
-    return f"{report.style}: {Path(report.name).name}{frames}, similarity {report.similarity:.2f}{notes}"
-
-
-def _still(pattern: TargetPattern, dwell_s: float, words: str) -> Shown:
-    shape = GridShape(*pattern.amplitude.shape)
-    return Shown(Scene(shape, (Frame(pattern, dwell_s),), {"kind": "texture"}), words)
-
-
-def joined(parts: Sequence[Shown], shape: GridShape) -> Scene:
-    """One scene after another; a single one stays what it is, so that a text can be read back."""
-    if len(parts) == 1:
-        return parts[0].scene
-    encoding: Mapping[str, Any] = {"kind": "sequence", "parts": [dict(part.scene.encoding) for part in parts]}
-    return Scene(shape, _Frames(tuple(part.scene for part in parts)), encoding)
-
-
-@dataclass(frozen=True)
-class _Frames:
-    """The frames of scenes one after another, pages counted on; encoded again on every reading."""
-
-    scenes: tuple[Scene, ...]
-
-    def __iter__(self) -> Iterator[Frame]:
-        first = 0
-        for scene in self.scenes:
-            page = -1
-            for frame in scene.frames:
-                page = max(page, frame.page)
-                yield replace(frame, page=first + frame.page)
-            first += page + 1
 
 
 def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[str]) -> SceneReport:
@@ -170,10 +84,14 @@ def render_scene(scene: Scene, device: Device, how: Rendering, parts: Sequence[s
 
     Raises
     ------
-    PlanError, DriverError
-        When the scene does not fit the device, or the disk refuses.
+    Declined
+        When a person was asked whether to write very much, and said no.
+    AppError, PlanError, DriverError
+        When the scene does not fit the device, or the disk has no room or refuses.
     """
     began = time.perf_counter()
+    if how.out is not None:
+        go_on(extent_of(scene.frames, device, how.out, how.encoding), how.out, yes=how.yes)
     how.study.limit = how.study.limit or TOLERANCES["normal"]
     watch = _Watch(plan_scene(scene, device, contrast_db=how.contrast_db), how)
     written: WrittenWaveform | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from encoders import TextSource
 
@@ -14,9 +14,11 @@ from .errors import AppError
 if TYPE_CHECKING:
     from chainsim import Simulation
 
-__all__ = ["simulation_source", "text_source"]
+__all__ = ["simulation_source", "standard_input", "text_source"]
 
 PIPE = "echo ... | dotwave text -"
+STANDARD_INPUT = "standard input"
+MAX_CHAIN_BYTES = 4_000_000
 
 
 def text_source(argument: str) -> TextSource:
@@ -30,7 +32,7 @@ def text_source(argument: str) -> TextSource:
         When what it names is not text, is broken, or is empty.
     """
     if argument == "-":
-        return TextSource.of_stream(sys.stdin.buffer)
+        return TextSource.of_stream(standard_input(), STANDARD_INPUT)
     if os.path.isdir(argument):
         raise AppError(f"{argument}: is a folder; name a text file, or pipe the words: {PIPE}")
     if os.path.exists(argument):
@@ -38,6 +40,19 @@ def text_source(argument: str) -> TextSource:
     if _looks_like_path(argument):
         raise AppError(f"{argument}: no such file; correct the path, or pipe the words: {PIPE}")
     return TextSource.of_text(argument)
+
+
+def standard_input() -> BinaryIO:
+    """Standard input, for bytes.
+
+    Raises
+    ------
+    AppError
+        When the program was started without.
+    """
+    if sys.stdin is None:
+        raise AppError(f"{STANDARD_INPUT}: is closed; pipe something into it, or name a file")
+    return sys.stdin.buffer
 
 
 def _looks_like_path(argument: str) -> bool:
@@ -50,11 +65,17 @@ def simulation_source(argument: str) -> Path | Simulation:
 
     Raises
     ------
-    chainsim.ProfileError
-        When standard input does not fit.
+    chainsim.ProfileError, AppError
+        When standard input does not fit, or is longer than a chain file can be.
     """
     if argument != "-":
         return Path(argument)
     from chainsim import parse_simulation
 
-    return parse_simulation(sys.stdin.read(), "standard input")
+    data = standard_input().read(MAX_CHAIN_BYTES + 1)
+    if len(data) > MAX_CHAIN_BYTES:
+        raise AppError(f"{STANDARD_INPUT}: more than {MAX_CHAIN_BYTES} bytes; such a file has at most so many")
+    try:
+        return parse_simulation(data.decode("utf-8-sig"), STANDARD_INPUT)
+    except UnicodeDecodeError as error:
+        raise AppError(f"{STANDARD_INPUT}: not UTF-8 at byte {error.start}; save it as UTF-8") from None

@@ -85,7 +85,7 @@ def run_sweep(
         When the sweep file does not fit.
     """
     from chainsim import read_sweep, unit_of
-    from drivers import FileError, atomic_file
+    from drivers import FileError, atomic_file, made_folder
 
     from .sweep_files import WRITERS, Parts
     from .sweep_parts import claimed, removed
@@ -104,7 +104,7 @@ def run_sweep(
     note = _note(sweep, fields, chunk)
     stored = Parts(out.with_name(out.name + ".parts"), range(0, len(sweep), chunk), note["sweep"])
     try:
-        with claimed(stored.folder, note):
+        with made_folder(out), claimed(stored.folder, note):
             todo = [first for first in stored.firsts if not stored.done(first)]
             _solve_all(source, stored, todo, chunk, fields, workers, sweep)
             counts = _counted(stored)

@@ -129,8 +129,6 @@ def _axes(size: tuple[float, float]) -> tuple[Any, Any]:
 
 
 def _save(figure: Any, picture: Path) -> None:
-    with naming(picture.parent):
-        picture.parent.mkdir(parents=True, exist_ok=True)
     # No date in the file: the same numbers give the same bytes.
     still: dict[str, None] = {"Date": None} if picture.suffix.lower() == ".svg" else {"Software": None}
     with atomic_file(picture) as file, naming(picture):

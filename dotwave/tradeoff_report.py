@@ -47,17 +47,10 @@ def planned(source: str, device: str | None, *, otherwise: str = "paper-6x6") ->
 
 
 def _of_job(path: Path, given: Device | None) -> tuple[Scene, Device, float]:
-    from .job import read_job
-    from .render import _shown, joined
+    from .job_scene import joined, read_job_scene
 
-    job, folder = read_job(path), path.parent
-    try:
-        device = given or job.device.device(folder)
-    except ValueError as error:
-        raise AppError(f"{path}: device: {error}") from None
-    shape = GridShape(device.rows, device.cols)
-    scene = joined([_shown(item, job, device, shape, folder) for item in job.sequence], shape)
-    return scene, device, job.contrast_db
+    found = read_job_scene(path, device=given)
+    return joined(found.parts, found.shape), found.device, found.job.contrast_db
 
 
 @dataclass(frozen=True)

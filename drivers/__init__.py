@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .channels import Channel, Role, channels_of
 from .coupling import CouplingEvent
 from .errors import DriverError, FileError, LimitError, UnreadableWaveform, WaveformError
-from .files import atomic_file, atomic_files, naming, settled
+from .files import atomic_file, atomic_files, made_folder, naming, settled
 from .limits import LimitCheck
 from .locks import held
 from .manifest import FrameMark, Manifest
@@ -104,6 +104,7 @@ __all__ = [
     "channels_of",
     "grid_line",
     "held",
+    "made_folder",
     "naming",
     "parse_outputs",
     "part_of",

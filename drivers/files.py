@@ -15,7 +15,7 @@ from typing import BinaryIO
 from .errors import FileError
 from .parts import Belongs, Part, finish, is_at, make, settle, sync_folder
 
-__all__ = ["atomic_file", "atomic_files", "naming", "settled"]
+__all__ = ["atomic_file", "atomic_files", "made_folder", "naming", "settled"]
 
 TAKEN_AWAY = "another program took away what was written so far; write it again, or in a folder of your own"
 NOT_A_FILE = "this is a device or a pipe; give the name of a file"
@@ -40,8 +40,39 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
+def made_folder(path: Path) -> Iterator[None]:
+    """Make the folder of `path` where missing; when the body fails, what was made and is empty goes again.
+
+    Raises
+    ------
+    FileError
+        When it cannot be made.
+    """
+    made: list[Path] = []
+    try:
+        with naming(path):
+            _make_folder(path.parent, made)
+        yield
+        made.clear()
+    finally:
+        for folder in reversed(made):
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def _make_folder(folder: Path, made: list[Path]) -> None:
+    """Make `folder` and what it lies in, where missing; each that is made is noted in `made`."""
+    if folder.exists():
+        return
+    _make_folder(folder.parent, made)
+    with suppress(FileExistsError):
+        folder.mkdir()
+        made.append(folder)
+
+
+@contextmanager
 def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple[BinaryIO, ...]]:
-    """Write files of one folder aside; put them in place together when the body ends well.
+    """Write files of one folder aside; put them in place together when the body ends well. The folder is made.
 
     Gives empty files, open for writing and reading; they are closed at the end. Then all are flushed to the disk and
     get their names in the given order. Whatever stops the body, an error, Ctrl-C or SIGKILL, the files of these names
@@ -58,6 +89,12 @@ def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple
     FileError
         Before the body when a file cannot be made there; after it when it cannot be put in place.
     """
+    with made_folder(paths[0]), _aside(paths, belongs) as files:
+        yield files
+
+
+@contextmanager
+def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[BinaryIO, ...]]:
     folder, token = paths[0].parent, secrets.token_hex(8)
     parts = [Part(path, token) for path in paths]
     files: list[BinaryIO] = []

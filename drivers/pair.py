@@ -126,6 +126,9 @@ def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     path = Path(path)
     manifest_path = path if path.suffix.lower() == ".json" else path.with_suffix(".json")
     settled(manifest_path, _belongs(path))
+    with naming(path):
+        # What was asked for is missed before what belongs to it.
+        path.stat()
     manifest = read_manifest(manifest_path)
     samples_path = manifest_path.with_name(manifest.samples_file)
     if path != manifest_path and path.name != samples_path.name:

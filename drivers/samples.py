@@ -85,9 +85,13 @@ def check_suffix(path: Path) -> str:
     Raises
     ------
     FileError
-        When it does not; the message lists those that do.
+        When it does not (the message lists those that do), or the name cannot stand in a manifest.
     """
     suffix = path.suffix.lower()
+    try:
+        path.name.encode()
+    except UnicodeEncodeError:
+        raise FileError(f"{path}: its name is not UTF-8 and cannot stand in a manifest; give another") from None
     if suffix not in SUFFIXES:
         raise FileError(f"{path}: expected a name that ends in {', '.join((*SUFFIXES, *EXCHANGE_SUFFIXES))}")
     return suffix

@@ -25,7 +25,7 @@ from .presentation import Presentation, read_cells
 from .report import EncodingReport, Split, UndefinedUse
 from .scene import Frame, GridShape, PatternKind, Scene, TargetPattern, WalkingBars
 from .sources import SourceKind, TextSource
-from .tables import TableInfo, list_tables, resolve_tables
+from .tables import TableInfo, foreign_tables, list_tables, resolve_tables
 from .text import TextFrames, TextOptions, TextScene, encode_text
 from .textures import Region, TextureError, bars, levels, plane_wave, regions, walking_bars
 from .transcribe import Translation, translate
@@ -100,6 +100,7 @@ __all__ = [
     "encode_text",
     "explain_picture",
     "felt_codes",
+    "foreign_tables",
     "join_pages",
     "levels",
     "liblouis_place",

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import LouisMissing
+from .louis_cure import install_words
 
 __all__ = [
     "back_translate",
@@ -32,7 +33,6 @@ __all__ = [
     "version",
 ]
 
-CURE = "install it with: apt-get install python3-louis"
 # Where distributions put the binding; a virtual environment does not look there.
 _PATTERNS = (
     "/usr/lib/python3/dist-packages",
@@ -57,7 +57,7 @@ _kept: list[Any] = []  # the C library holds a pointer to the callback: it must 
 def _louis() -> ModuleType:
     module = _imported() or _from_distribution()
     if module is None:
-        raise LouisMissing(f"the Braille library liblouis (python3-louis) was not found; {CURE}")
+        raise LouisMissing(f"the Braille library liblouis (python3-louis) was not found; {install_words()}")
 
     def note(level: int, message: bytes) -> None:
         if level >= _LOG_ERROR:
@@ -90,7 +90,7 @@ def _from_distribution() -> ModuleType | None:
             try:
                 spec.loader.exec_module(module)
             except (ImportError, OSError) as error:
-                raise LouisMissing(f"{path} cannot be loaded ({error}); {CURE}") from None
+                raise LouisMissing(f"{path} cannot be loaded ({error}); {install_words()}") from None
             return module
     return None
 

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import BinaryIO
 
 from .brf import brf_to_cells
-from .errors import EmptyText, InvalidText, UnsupportedSource
+from .errors import EmptyText, EncodeError, InvalidText, UnsupportedSource
 
 __all__ = ["SourceKind", "TextSource"]
+
+# A thick book has some megabytes.
+MAX_BYTES = 64_000_000
 
 
 class SourceKind(StrEnum):
@@ -105,15 +108,23 @@ class TextSource:
         if suffix in _SUFFIXES:
             raise UnsupportedSource(f"{path}: {_SUFFIXES[suffix]} is not read; {_READ}")
         try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise UnsupportedSource(f"{path}: cannot be read: {error.strerror or error}") from None
-        return cls.of_bytes(data, str(path), brf=suffix in {".brf", ".brl"})
+            with path.open("rb") as file:
+                return cls.of_stream(file, str(path), brf=suffix in {".brf", ".brl"})
+        except (OSError, ValueError) as error:
+            if isinstance(error, EncodeError):
+                raise
+            raise UnsupportedSource(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
     @classmethod
     def of_stream(cls, stream: BinaryIO, name: str = "standard input", *, brf: bool = False) -> TextSource:
-        """A source from a binary stream, read once to its end; raises as `of_bytes` does."""
-        return cls.of_bytes(stream.read(), name, brf=brf)
+        """A source from a binary stream, read once to its end, which comes within 64 MB; raises as `of_bytes` does."""
+        try:
+            data = stream.read(MAX_BYTES + 1)
+        except OSError as error:
+            raise UnsupportedSource(f"{name}: cannot be read: {error.strerror or error}") from None
+        if len(data) > MAX_BYTES:
+            raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
+        return cls.of_bytes(data, name, brf=brf)
 
 
 _READ = "give UTF-8 text, Unicode Braille or a BRF file"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -10,7 +12,7 @@ from pathlib import Path
 from . import louis_binding
 from .errors import TableMissing
 
-__all__ = ["TableInfo", "hyphenation_tables", "list_tables", "resolve_tables", "table_dots"]
+__all__ = ["TableInfo", "foreign_tables", "hyphenation_tables", "list_tables", "resolve_tables", "table_dots"]
 
 
 @dataclass(frozen=True)
@@ -77,15 +79,28 @@ def resolve_tables(spec: str) -> tuple[str, ...]:
     LouisMissing
         When liblouis is not installed.
     """
-    wish = spec.strip()
-    if not wish:
-        raise TableMissing("table: the name is empty; 'dotwave tables' lists all")
-    if ":" in wish and not any(sign in wish for sign in "/\\"):
+    wish = _checked(spec)
+    if _is_query(wish):
         return (_answer(wish),)
     tables = tuple(part.strip() for part in wish.split(",") if part.strip())
     if tables and louis_binding.compiles(tables):
         return tables
     raise TableMissing(_complaint(wish, tables))
+
+
+def _checked(spec: str) -> str:
+    wish = spec.strip()
+    if not wish:
+        raise TableMissing("table: the name is empty; 'dotwave tables' lists all")
+    if len(wish) > MOST_NAMED:
+        raise TableMissing(f"table: {len(wish)} characters; a name or list of names has at most {MOST_NAMED}")
+    if _NO_NAME.search(wish):
+        raise TableMissing(f"table {wish[:60]!r}: a character that no table's name has; 'dotwave tables' lists all")
+    return wish
+
+
+def _is_query(wish: str) -> bool:
+    return ":" in wish and not any(sign in wish for sign in "/\\")
 
 
 def _answer(query: str) -> str:
@@ -119,13 +134,22 @@ def _nearest_answers(wishes: list[tuple[str, str, str]]) -> str:
     return f"; for language {wanted} there are: {shown}"
 
 
+# liblouis keeps names in buffers of its own.
+MOST_NAMED = 1000
+# Control characters, and halves of surrogate pairs.
+_NO_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
+_PLACE = re.compile(r"[^\n]*?:\d+(?=: )")
+
+
 def _complaint(wish: str, tables: tuple[str, ...]) -> str:
     known = {info.file: info for info in list_tables()}
     files = {path.name for folder in _folders() for path in folder.iterdir()}
     missing = [name for name in tables if name not in files and not Path(name).is_file()]
     if not missing:
-        why = louis_binding.complaint()
-        return f"table {wish!r} does not compile{': ' + why if why else ''}; choose another ('dotwave tables')"
+        # Only where it stands: what stands there may be of a file that is none of the reader's business.
+        place = _PLACE.match(louis_binding.complaint())
+        where = f": {place[0]}: expected a rule of liblouis (lou_checktable says more)" if place else ""
+        return f"table {wish!r} does not compile{where}; choose another ('dotwave tables')"
     name = missing[0]
     lowered = {file.casefold(): file for file in known}
     close = [lowered[match] for match in get_close_matches(name.casefold(), list(lowered), n=3, cutoff=0.6)]
@@ -140,6 +164,24 @@ def _complaint(wish: str, tables: tuple[str, ...]) -> str:
 def _folders() -> tuple[Path, ...]:
     folders = {Path(path).parent for path in louis_binding.listed_tables()}
     return tuple(sorted(folder for folder in folders if folder.is_dir()))
+
+
+def foreign_tables(spec: str) -> tuple[str, ...]:
+    """Those of the tables a person means by `spec` that liblouis did not bring along.
+
+    Files of the current folder that bear a name of liblouis's own are among them: they would be taken for it.
+
+    Raises
+    ------
+    TableMissing
+        When nothing answers a query, or the names cannot be any.
+    LouisMissing
+        When liblouis is not installed.
+    """
+    wish = _checked(spec)
+    names = [_answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
+    own = {path.name for folder in _folders() for path in folder.iterdir()}
+    return tuple(name for name in names if name not in own or os.path.lexists(name))
 
 
 def table_dots(tables: tuple[str, ...]) -> int:
@@ -157,7 +199,7 @@ def hyphenation_tables(tables: tuple[str, ...]) -> tuple[str, ...]:
     for folder in _folders() if spoken else ():
         language = spoken.split("-")[0].casefold()
         for path in sorted((*folder.glob(f"hyph_{language}.dic"), *folder.glob(f"hyph_{language}_*.dic"))):
-            together = (*tables, path.name)
+            together = (*tables, str(path))
             if louis_binding.compiles(together):
                 return together
     return ()

@@ -127,15 +127,6 @@ def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
     assert (ended.code, ended.out, ended.err) == (2, "", "dotwave: x.wav: what is wrong and the cure\n")
 
 
-def test_a_fault_of_the_program_is_not_called_bad_input(dotwave, stand_in) -> None:
-    def fail(path: Path) -> VerifyReport:
-        raise ZeroDivisionError
-
-    stand_in("verify", verify=fail)
-    with pytest.raises(ZeroDivisionError):
-        dotwave("verify", "x.wav")
-
-
 def test_ctrl_c_is_130(dotwave, stand_in) -> None:
     def interrupt(path: Path) -> VerifyReport:
         raise KeyboardInterrupt
@@ -215,7 +206,7 @@ def test_simulate_prints_strict_json_and_says_ok_by_its_exit_code(dotwave, tmp_p
     first = 0.01 / (1 - 1.1**2 + 1j * 0.05 * 1.1)
     assert complex(*answer["phasor"][0]) == pytest.approx(first, rel=1e-9)
     assert dotwave("simulate", tmp_path / "missing.yaml").code == 2
-    monkeypatch.setattr(sys, "stdin", io.StringIO(chain.read_text()))
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(chain.read_bytes())))
     assert json.loads(dotwave("simulate", "-").out)["phasor"] == answer["phasor"]
     chain.write_text(setting.replace("beta: 0.0", "beta: -1.0").replace("0.01", "9.0") + "tol: 1.0e-6\n")
     escaped = dotwave("simulate", chain)

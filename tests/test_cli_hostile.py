@@ -62,7 +62,7 @@ def test_files_that_are_not_text(tmp_path, content, says):
         (["Hello", "--device", "nosuch"], "not a built-in profile"),
         (["Hello", "--device", "linked-6x6", "--dwell", "0.2"], "--dwell"),
         (["Hello", "--dwell", "-1"], "dwell"),
-        (["Hello", "-o", "nosuch/out.wav"], "nosuch"),
+        (["Hello", "-o", "given.txt/out.wav"], "given.txt is not a folder"),
         (["Hello", "-o", "out.mp3"], ".wav"),
         (["no/such/file.txt"], "no such file"),
         (["漢", "--undefined", "error"], "U+6F22"),
@@ -70,6 +70,7 @@ def test_files_that_are_not_text(tmp_path, content, says):
     ],
 )
 def test_options_that_cannot_be_used(tmp_path, arguments, says):
+    (tmp_path / "given.txt").write_text("Hello", "utf-8")
     output = [] if "-o" in arguments else ["-o", "out.wav"]
     done = run(tmp_path, "text", *arguments, *output)
     assert done.returncode == 2, done.stderr

@@ -188,8 +188,8 @@ def test_output_that_cannot_be(source, tmp_path):
         run_sweep(source, tmp_path / "out.txt")
     with pytest.raises(AppError, match="no such field"):
         run_sweep(source, tmp_path / "out.npz", only=("colour",))
-    with pytest.raises(AppError, match="No such file"):
-        run_sweep(source, tmp_path / "nowhere" / "out.npz")
+    with pytest.raises(AppError, match="Not a directory"):
+        run_sweep(source, source / "out.npz")
 
 
 def test_report(source, tmp_path):

@@ -1,13 +1,17 @@
 """Finding liblouis, its tables, and saying what is missing."""
 
+import re
 import subprocess
 import sys
 import types
+from pathlib import Path
 
 import pytest
 
-from encoders import LouisMissing, TableMissing, list_tables, louis_binding, resolve_tables
-from encoders.tables import hyphenation_tables, table_dots
+from encoders import LouisMissing, TableMissing, list_tables, louis_binding, louis_cure, resolve_tables
+from encoders.tables import foreign_tables, hyphenation_tables, table_dots
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_tables_carry_metadata():
@@ -44,6 +48,11 @@ def test_specs(spec, tables):
         ("language:xx", "none answers the query"),
         ("", "empty"),
         (",", "no such table|does not compile"),
+        ("x" * 5000, "5000 characters; a name or list of names has at most 1000"),
+        ("en-ueb-g2.ctb\0.dic", "a character that no table's name has"),
+        ("\ud800.ctb", "a character that no table's name has"),
+        ("gr\xfc\xdfe.ctb", "'gr\xfc\xdfe.ctb': no such table"),
+        ("gr\udcfc.ctb", "a character that no table's name has"),
     ],
 )
 def test_a_wrong_table_is_one_line_with_the_nearest(spec, says):
@@ -55,9 +64,19 @@ def test_a_wrong_table_is_one_line_with_the_nearest(spec, says):
 def test_a_table_that_does_not_compile_says_why(tmp_path, capfd):
     path = tmp_path / "broken.utb"
     path.write_text("nonsense a b\n")
-    with pytest.raises(TableMissing, match=r"does not compile.*nonsense"):
+    with pytest.raises(TableMissing, match=r"does not compile: .*broken\.utb:1: expected a rule of liblouis") as caught:
         resolve_tables(str(path))
+    assert "nonsense" not in str(caught.value), "what stands in a file is told to nobody"
     assert capfd.readouterr() == ("", ""), "the library itself prints nothing"
+
+
+def test_tables_that_liblouis_did_not_bring_along(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert foreign_tables("en-ueb-g2.ctb, hyph_en_US.dic") == foreign_tables("language:de grade:2") == ()
+    assert foreign_tables("en-ueb-g2.ctb,./own.utb,../x") == ("./own.utb", "../x")
+    assert foreign_tables("/etc/passwd") == ("/etc/passwd",)
+    (tmp_path / "en-ueb-g2.ctb").touch()
+    assert foreign_tables("en-ueb-g2.ctb") == ("en-ueb-g2.ctb",), "liblouis would take the file of the current folder"
 
 
 def test_dots_of_tables():
@@ -67,7 +86,9 @@ def test_dots_of_tables():
 
 
 def test_hyphenation_dictionaries_are_found_by_language():
-    assert hyphenation_tables(("de-g2.ctb",)) == ("de-g2.ctb", "hyph_de_DE.dic")
+    table, dictionary = hyphenation_tables(("de-g2.ctb",))
+    assert (table, Path(dictionary).name) == ("de-g2.ctb", "hyph_de_DE.dic")
+    assert Path(dictionary).is_file(), "a file of that name in the current folder is not meant"
     assert hyphenation_tables(("ar-ar-g1.utb",)) == ()
     assert louis_binding.hyphenate(("en-ueb-g2.ctb", "hyph_en_US.dic"), "knowledgeable") == [5, 9]
 
@@ -86,8 +107,35 @@ def test_a_false_louis_is_passed_over(monkeypatch):
 def test_without_liblouis_the_cure_is_named(monkeypatch):
     monkeypatch.setattr(louis_binding, "_imported", lambda: None)
     monkeypatch.setattr(louis_binding, "_from_distribution", lambda: None)
-    with pytest.raises(LouisMissing, match="apt-get install python3-louis"):
+    with pytest.raises(LouisMissing, match=re.escape(louis_cure.install_words())):
         louis_binding._louis.__wrapped__()
+
+
+@pytest.mark.parametrize("tool", louis_cure.INSTALLERS)
+def test_the_cure_is_that_of_the_package_manager(monkeypatch, tool):
+    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: f"/bin/{name}" if name == tool else None)
+    assert louis_cure.install_words() == f"install it with: {louis_cure.INSTALLERS[tool]}"
+
+
+@pytest.mark.parametrize(("platform", "says"), [("darwin", "Homebrew"), ("win32", "wsl"), ("linux", "liblouis.io")])
+def test_without_a_package_manager_the_cure_is_that_of_the_system(monkeypatch, platform, says):
+    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: None)
+    monkeypatch.setattr(louis_cure.sys, "platform", platform)
+    assert says in louis_cure.install_words()
+    assert ("apt-get" in louis_cure.install_words()) == (platform == "win32")
+
+
+def test_run_names_the_same_cures():
+    lines = [line.strip() for line in (ROOT / "run").read_text(encoding="utf-8").splitlines()]
+    for tool, command in louis_cure.INSTALLERS.items():
+        if tool == "apt-get":
+            assert 'apt_install "$@"' in lines
+            assert 'has_louis || set -- "$@" python3-louis' in lines
+        else:
+            asked = next(number for number, line in enumerate(lines) if f"if command -v {tool} >" in line)
+            assert lines[asked + 1] == f"echo '{command}'"
+    for words in (louis_cure.ELSEWHERE["darwin"], louis_cure.UNKNOWN):
+        assert f"echo '{words}'" in lines
 
 
 def test_importing_encoders_is_light():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -92,6 +93,7 @@ def test_an_installation_that_failed_is_tried_again(house: House) -> None:
     failed = house.run("dotwave", "doctor")
     assert failed.returncode == 1
     assert "pip could not install" in failed.stderr
+    assert "the Python package registry (PyPI)" in failed.stderr
     broken.unlink()
     assert house.run("dotwave", "doctor").returncode == 0
     assert len(house.called("pip")) == 2
@@ -141,6 +143,17 @@ def test_all_adds_the_slow_tests_and_the_rest_goes_to_pytest(house: House) -> No
     assert usual.endswith("tests/a b.py -x")
     assert "not slow" not in everything
     assert "--all" not in everything
+
+
+def test_how_long_the_tests_take_is_said_before(house: House) -> None:
+    usual, everything, some = (house.run("test", *arguments) for arguments in ([], ["--all"], ["tests/test_x.py"]))
+    assert "run: the tests take about 4 minutes on two cores; here they use " in usual.stderr
+    assert "run: the tests take about 25 minutes on two cores" in everything.stderr
+    assert "minutes" not in some.stderr
+    cores = re.search(r"here they use (\d+)$", usual.stderr, flags=re.MULTILINE)
+    assert cores is not None
+    assert int(cores[1]) == min(os.cpu_count() or 2, 8)
+    assert all(f" -n {cores[1]}" in line for line in house.called("tool") if " pytest " in line)
 
 
 @pytest.mark.parametrize(

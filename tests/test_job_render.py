@@ -132,7 +132,7 @@ def test_a_budget_that_is_used_up_is_an_outcome(tmp_path: Path) -> None:
 
 
 def test_errors_name_the_item(tmp_path: Path) -> None:
-    with pytest.raises(AppError, match=r"job.yaml: sequence.1: .*nowhere.png: cannot be read"):
+    with pytest.raises(AppError, match=r"job.yaml:1: sequence.1.image: .*nowhere.png: cannot be read"):
         render_job(job(tmp_path, "sequence: [{text: a}, {image: nowhere.png}]"))
     with pytest.raises(AppError, match=r"sequence.0: levels|region|.*"):
         render_job(

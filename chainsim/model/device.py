@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -296,6 +297,9 @@ def load_device(name: str) -> Device:
     if name in device_names():
         return read_model(PROFILES / f"{name}.yaml", Device)
     path = Path(name)
-    if path.suffix.lower() in {".yaml", ".yml"} or path.is_file():
+    if path.suffix.lower() in {".yaml", ".yml"}:
         return read_model(path, Device)
-    raise ProfileError(f"device {name!r}: not a built-in profile ({', '.join(device_names())}) and not a .yaml file")
+    close = get_close_matches(name.casefold(), device_names(), n=1)
+    meant = f"; did you mean {close[0]}?" if close else ""
+    known = ", ".join(device_names())
+    raise ProfileError(f"device {name!r}: not a built-in profile ({known}) and not a .yaml file{meant}")
