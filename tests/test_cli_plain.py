@@ -60,7 +60,7 @@ NAME = "=a$\\frac{$b\x1b[31m\u202ex\nOK"
 
 def nasty_profile(folder: Path) -> Path:
     """A profile whose name would colour a terminal, turn a page, and begins as a formula; JSON strings are YAML."""
-    text = (ROOT / "chainsim/profiles/paper-6x6.yaml").read_text(encoding="utf-8").splitlines()
+    text = (ROOT / "chainsim/model/profiles/paper-6x6.yaml").read_text(encoding="utf-8").splitlines()
     lines = [f"name: {json.dumps(NAME)}" if line.startswith("name:") else line for line in text]
     path = folder / "nasty.yaml"
     path.write_text("\n".join(lines), encoding="utf-8")
