@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import struct
+import os
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import TextIOWrapper
@@ -25,12 +24,9 @@ Arrays = dict[str, NDArray[Any]]
 
 # The oldest date a ZIP can hold: same input, same bytes.
 EPOCH = (1980, 1, 1, 0, 0, 0)
-# What zipfile and numpy say of a file that is not what they wrote.
-DAMAGE = (
-    zipfile.BadZipFile, zlib.error, struct.error, KeyError, ValueError, TypeError, EOFError, NotImplementedError,
-    RuntimeError, MemoryError,
-)  # fmt: skip
-DIGEST = "digest"
+# What numpy says of a file that was damaged after it was found whole.
+DAMAGE = (zipfile.BadZipFile, KeyError, ValueError, EOFError)
+DIGEST = 32  # bytes
 
 
 @dataclass(frozen=True)
@@ -46,40 +42,42 @@ class Parts:
         return self.folder / f"{first:012d}.npz"
 
     def save(self, first: int, arrays: Arrays) -> None:
-        """Keep the chunk that starts at `first`, with a digest of it."""
+        """Keep the chunk that starts at `first`; a digest of the file stands at its end, as the comment of the ZIP."""
         with atomic_file(self.path(first)) as file:
-            np.savez(file, allow_pickle=False, **arrays, **{DIGEST: np.array(self._digest(first, arrays))})
+            np.savez(file, allow_pickle=False, **arrays)
+            with zipfile.ZipFile(file, "a") as archive:
+                archive.comment = bytes(DIGEST)
+            file.seek(-DIGEST, os.SEEK_END)
+            file.write(self._digest(first, file))
 
     def done(self, first: int) -> bool:
         """Whether the chunk that starts at `first` is there as it was kept; one that is damaged is not."""
         try:
-            with zipfile.ZipFile(self.path(first)) as archive:
-                arrays = {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}
-            return str(arrays.pop(DIGEST)) == self._digest(first, arrays)
-        except (FileNotFoundError, *DAMAGE):
+            with self.path(first).open("rb") as file:
+                digest = self._digest(first, file)
+                return file.read() == digest
+        except FileNotFoundError:
             return False
 
     def field(self, name: str) -> Iterator[NDArray[Any]]:
         """One field, chunk by chunk."""
         for first in self.firsts:
             try:
-                with zipfile.ZipFile(self.path(first)) as archive:
-                    array = _array(archive, f"{name}.npy")
+                with self.path(first).open("rb") as file, np.load(file, allow_pickle=False) as stored:
+                    array = stored[name]
             except DAMAGE:
                 raise AppError(f"{self.path(first)}: damaged; the same call again solves it anew") from None
             yield array
 
-    def _digest(self, first: int, arrays: Arrays) -> str:
+    def _digest(self, first: int, file: BinaryIO) -> bytes:
+        """Of all that stands before it, and of where it belongs; leaves the file where it begins."""
+        left = max(0, file.seek(0, os.SEEK_END) - DIGEST)
+        file.seek(0)
         digest = hashlib.sha256(f"{self.sweep} {first}".encode())
-        for name, array in arrays.items():
-            digest.update(f"{name} {array.dtype.str} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
-        return digest.hexdigest()
-
-
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    with archive.open(name) as member:
-        array: NDArray[Any] = np.lib.format.read_array(member, allow_pickle=False)
-    return array
+        while piece := file.read(min(left, 1 << 20)):
+            digest.update(piece)
+            left -= len(piece)
+        return digest.digest()
 
 
 def _write_npz(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int) -> None:
