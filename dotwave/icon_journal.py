@@ -8,9 +8,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from drivers import naming
+from drivers import FileError, naming
 
 __all__ = ["Journal"]
+
+START = b'{"key":'
 
 
 class Journal:
@@ -18,16 +20,24 @@ class Journal:
 
     A record is one line, written at once: a line that was cut short is not a record and is passed over.
     The last record of a key counts. Only the places of records are kept in memory.
+
+    Raises
+    ------
+    drivers.FileError
+        When the disk refuses, or the file is another than such a journal; it is then left as it is.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._places: dict[str, tuple[int, int]] = {}
         with naming(path):
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0), 0o666)
             end, raw = 0, b"\n"
             with path.open("rb") as lines:
                 for raw in lines:
+                    if not end and not _starts(raw):
+                        os.close(self._file)
+                        raise FileError(f"{path}: not a journal of dotwave icons; give another folder, or move it away")
                     self._note(raw, end)
                     end += len(raw)
         if not raw.endswith(b"\n"):
@@ -80,3 +90,8 @@ class Journal:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         os.close(self._file)
+
+
+def _starts(line: bytes) -> bool:
+    """Whether a journal may begin with this line, which may have been cut short."""
+    return line.startswith(START) or START.startswith(line.rstrip())

@@ -21,6 +21,7 @@ from dotwave.icon_journal import Journal
 from dotwave.icon_pool import LocalPool
 from dotwave.icon_work import Recipe, Record, Task
 from dotwave.icons import IconOptions, render_icons
+from drivers import FileError
 from encoders import GridShape, encode_picture
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "icons"
@@ -318,3 +319,30 @@ def test_names_cannot_break_the_page(tmp_path: Path) -> None:
     page = Page()
     page.feed((tmp_path / "out/index.html").read_text(encoding="utf-8"))
     assert "".join(page.headings) == name
+
+
+@pytest.mark.parametrize("content", [b"my notes\n", b'{"mine": 1}\n', b"\0" * 100, b"[]"])
+def test_a_file_that_is_no_journal_is_refused_and_stays(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "journal.jsonl").write_bytes(content)
+    with pytest.raises(FileError, match=r"journal\.jsonl: not a journal of dotwave icons; give another folder"):
+        render_icons([str(SAMPLES / "heart.svg")], tmp_path, ONE)
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("journal.jsonl", content)]
+
+
+def test_a_journal_is_not_looked_for_behind_a_link(tmp_path: Path) -> None:
+    (tmp_path / "victim").write_bytes(b"")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "journal.jsonl").symlink_to(tmp_path / "victim")
+    with pytest.raises(FileError, match=r"journal\.jsonl: "):
+        render_icons([str(SAMPLES / "heart.svg")], tmp_path / "out", ONE)
+    assert (tmp_path / "victim").read_bytes() == b""
+
+
+@pytest.mark.parametrize("cut", [0, 1, 5, 9])
+def test_a_journal_cut_short_in_its_first_line_goes_on(tmp_path: Path, cut: int) -> None:
+    (tmp_path / "x.jsonl").write_bytes(b'{"key":"a"'[:cut])
+    for _ in range(2):
+        with Journal(tmp_path / "x.jsonl") as journal:
+            journal.add({"key": "b"})
+    with Journal(tmp_path / "x.jsonl") as journal:
+        assert journal.find("b") == {"key": "b"}
