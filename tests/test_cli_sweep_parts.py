@@ -32,7 +32,7 @@ TOKEN = "0123456789abcdef"
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A sweep of seven small chunks."""
-    monkeypatch.setattr("chainsim.sweeping.sweeps._UNIT", 48)
+    monkeypatch.setattr("chainsim.batch.sweep._UNIT", 48)
     path = tmp_path / "sweep.yaml"
     path.write_text(TEXT)
     return path
@@ -263,7 +263,7 @@ def test_a_piece_that_is_damaged_after_it_was_checked_is_one_line(
     with pytest.raises(AppError, match=r"000000000006\.npz: damaged; the same call again solves it anew"):
         run(source, out)
     monkeypatch.undo()
-    monkeypatch.setattr("chainsim.sweeping.sweeps._UNIT", 48)
+    monkeypatch.setattr("chainsim.batch.sweep._UNIT", 48)
     assert run(source, out) == 6
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +16,14 @@ from ..model.chain import Chain, Setting
 from ..rung import Start
 from ..yamlfile import read_model
 from .chain_section import ChainSection
+from .sweep_table import AXES, read_table
 
 __all__ = ["SettingSweep", "read_sweep"]
 
 Floats = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-AXES = ("epsilon", "lam", "omega")
+MOST_STEPS = 10_000_000
+MOST_SETTINGS = 1_000_000_000
 
 
 class _Part(BaseModel):
@@ -36,7 +37,13 @@ class _Range(_Part):
     log: bool = False
 
     @model_validator(mode="after")
-    def _positive_if_log(self) -> _Range:
+    def _can_be_made(self) -> _Range:
+        if self.steps > MOST_STEPS:
+            raise ValueError(
+                f"expected at most {MOST_STEPS} steps, got {self.steps}; take fewer, or sweep a part at a time"
+            )
+        if not math.isfinite(self.to - self.start):
+            raise ValueError(f"from {self.start} to {self.to} is too far for numbers of a computer; take a part of it")
         if self.log and min(self.start, self.to) <= 0:
             raise ValueError(f"a log range needs ends > 0, got {self.start} and {self.to}")
         return self
@@ -135,12 +142,18 @@ def read_sweep(path: Path) -> SettingSweep:
     """
     given = read_model(path, _File)
     chain, asked = given.chain.built(), given.setting
-    table = {} if asked.table is None else _table(path.parent / asked.table)
+    table = {} if asked.table is None else read_table(path.parent / asked.table)
     columns = [_column(path, asked, table, name) for name in AXES]
     if table:
         rows = len(next(iter(table.values())))
         columns = [np.broadcast_to(c, (rows, *c.shape[1:])) if len(c) == 1 else c for c in columns]
     shape = (rows,) if table else tuple(len(column) for column in columns)
+    if math.prod(shape) > MOST_SETTINGS:
+        sizes = " x ".join(map(str, shape))
+        raise ProfileError(
+            f"{path}: setting: {sizes} = {math.prod(shape)} settings; a sweep has at most {MOST_SETTINGS}; "
+            "take fewer steps, or sweep a part at a time"
+        )
     fixed: dict[str, Any] = {"preload": asked.preload, "bias": np.asarray(asked.bias), "phase": asked.phase}
     if asked.lam_y is not None:
         fixed["lam_y"] = asked.lam_y
@@ -178,58 +191,3 @@ def _column(path: Path, asked: _Setting, table: dict[str, Floats], name: str) ->
     else:
         made = np.array([value], dtype=np.float64)
     return made.reshape(len(made), -1) if name == "lam" else made
-
-
-def _table(path: Path) -> dict[str, Floats]:
-    """Columns of a table by axis name, all of one length."""
-    readers = {".npz": _read_npz, ".csv": _read_csv}
-    if path.suffix.lower() not in readers:
-        raise ProfileError(f"{path}: expected a table named .npz or .csv")
-    try:
-        found = readers[path.suffix.lower()](path)
-    except OSError as error:
-        raise ProfileError(f"{path}: {error.strerror or error}") from None
-    lengths = {name: len(column) for name, column in found.items()}
-    if not found or not min(lengths.values()):
-        raise ProfileError(f"{path}: no rows of {', '.join(AXES)}")
-    if len(set(lengths.values())) > 1:
-        raise ProfileError(f"{path}: columns of different lengths: {lengths}")
-    for name, column in found.items():
-        if not np.isfinite(column).all():
-            raise ProfileError(f"{path}: {name}: expected finite numbers, got {column[~np.isfinite(column)][0]}")
-    return found
-
-
-def _read_npz(path: Path) -> dict[str, Floats]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: np.asarray(stored[name], dtype=np.float64) for name in AXES if name in stored}
-    except (ValueError, KeyError) as error:
-        raise ProfileError(f"{path}: not an NPZ of numbers: {error}") from None
-
-
-def _read_csv(path: Path) -> dict[str, Floats]:
-    with path.open(encoding="utf-8-sig", newline="") as lines:
-        reader = csv.reader(lines)
-        header = [name.strip() for name in next(reader, [])]
-        unknown = [name for name in header if name not in AXES and not name.startswith("lam_")]
-        if unknown:
-            raise ProfileError(
-                f"{path}:1: unknown column {unknown[0]!r}; expected {', '.join(AXES)} or lam_1, lam_2, ..."
-            )
-        rows = []
-        for line, row in enumerate(reader, 2):
-            try:
-                rows.append([float(cell) for cell in row])
-            except ValueError:
-                raise ProfileError(f"{path}:{line}: expected numbers, got {','.join(row)!r}") from None
-            if len(row) != len(header):
-                raise ProfileError(f"{path}:{line}: expected {len(header)} numbers, got {len(row)}")
-    numbers = np.array(rows, dtype=np.float64).reshape(-1, len(header))
-    links = sorted(
-        (int(name[4:]), at) for at, name in enumerate(header) if name.startswith("lam_") and name[4:].isdigit()
-    )
-    found = {name: numbers[:, at] for at, name in enumerate(header) if name in AXES}
-    if links:
-        found["lam"] = numbers[:, [at for _, at in links]]
-    return found
