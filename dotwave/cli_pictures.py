@@ -90,6 +90,9 @@ def icons(
     closer_than: Annotated[int, typer.Option(min=0, help="List pairs that differ in fewer dots.")] = 2,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes side by side; default: all cores.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Work on a dask cluster: tcp://HOST:PORT.")] = None,
+    icon_seconds: Annotated[
+        float, typer.Option(min=0.1, help="Processor time that one icon may take; not with --scheduler.")
+    ] = 20.0,
     dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
     contrast: Contrast = 20.0,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
@@ -114,7 +117,7 @@ def icons(
     options = IconOptions(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
-        tol=asked.tol, budget_s=asked.budget_s, yes=yes,
+        tol=asked.tol, budget_s=asked.budget_s, yes=yes, icon_seconds=icon_seconds,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)

@@ -56,8 +56,11 @@ def members(archive: Path) -> Iterator[tuple[str, Callable[[int], bytes]]]:
 def _first(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
     if info.flag_bits & ENCRYPTED:
         raise RuntimeError("it is encrypted; pack the archive without a password")
-    with archive.open(info) as file:
-        return file.read(most)
+    try:
+        with archive.open(info) as file:
+            return file.read(most)
+    except UnicodeDecodeError:
+        raise zipfile.BadZipFile("its name is not the UTF-8 that it is said to be; pack the archive again") from None
 
 
 def _first_of_tar(archive: tarfile.TarFile, entry: tarfile.TarInfo, most: int) -> bytes:
@@ -77,9 +80,10 @@ class _Entry(tarfile.TarInfo):
 
 
 class _LenientNames(io.BufferedReader):
-    """A zip file in which a name that says it is UTF-8 and is not counts as code page 437, as old ones do.
+    """A zip file whose directory has the name of every member.
 
-    zipfile gives up on the whole archive for one such name.
+    zipfile gives up on the whole archive for one name that says it is UTF-8 and is not. It counts as code page 437
+    here, as names in old archives do.
     """
 
     def __init__(self, path: Path) -> None:

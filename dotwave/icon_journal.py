@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,7 +25,7 @@ class Journal:
     Raises
     ------
     drivers.FileError
-        When the disk refuses, or the file is another than such a journal; it is then left as it is.
+        When `path` is no such journal, which is then left as it is, or the disk refuses.
     """
 
     def __init__(self, path: Path) -> None:
@@ -32,6 +33,9 @@ class Journal:
         self._places: dict[str, tuple[int, int]] = {}
         with naming(path):
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0), 0o666)
+            if not stat.S_ISREG(os.fstat(self._file).st_mode):
+                os.close(self._file)
+                raise FileError(f"{path}: not a plain file, so nothing can be kept there; move it away")
             end, raw = 0, b"\n"
             with path.open("rb") as lines:
                 for raw in lines:
@@ -54,7 +58,10 @@ class Journal:
     def _write(self, raw: bytes) -> int:
         """Where it was written; another run into the same file may have made it longer in between."""
         with naming(self._path):
-            os.write(self._file, raw)
+            left = memoryview(raw)
+            while left:
+                # A disk that becomes full takes a part and refuses the next.
+                left = left[os.write(self._file, left) :]
             return os.lseek(self._file, 0, os.SEEK_CUR) - len(raw)
 
     def __contains__(self, key: str) -> bool:

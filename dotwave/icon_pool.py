@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
+from multiprocessing.connection import Connection, wait
 from types import TracebackType
-from typing import Any
+from typing import Any, cast
 
 from .errors import AppError
-from .icon_work import Recipe, Record, Task, code_digest
+from .icon_work import Recipe, Record, Task, all_of_batch, code_digest
+from .workers import Gone, Made, Ready, Worker
 
-__all__ = ["ClusterPool", "LocalPool", "Pool", "Work"]
+__all__ = ["TASK_S", "ClusterPool", "LocalPool", "Pool", "Work"]
 
-Work = Callable[[Recipe, Sequence[Task]], list[Record]]
+Work = Callable[[Recipe, Sequence[Task]], Iterable[Record]]
+"""Gives a record for each task, in their order, as it goes."""
 
+# Processor time of a task; icons take milliseconds, the largest that are let through a few seconds.
+TASK_S = 20.0
+SIMPLER = "simplify the picture, or raise --icon-seconds"
 # Batches handed out ahead for each worker.
 AHEAD = 3
 # Large pictures go in smaller batches, so that few of them are in memory at a time.
@@ -62,7 +64,7 @@ class Pool(ABC):
         # One at a time, so that a task that ends its worker takes no other with it.
         for task in failed:
             for ended in self._finished(work, recipe, [(task,)]):
-                yield ended.records or [{"key": task.key, "bad": ended.problem, "lost": True}]
+                yield ended.records or [_lost(task, ended.problem)]
 
     @abstractmethod
     def _finished(self, work: Work, recipe: Recipe, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
@@ -78,6 +80,10 @@ class Pool(ABC):
         """Let go of the workers; at once when the body was interrupted."""
 
 
+def _lost(task: Task, problem: str) -> Record:
+    return {"key": task.key, "bad": problem, "lost": True}
+
+
 def _batches(tasks: Iterable[Task], size: int) -> Iterator[tuple[Task, ...]]:
     batch: list[Task] = []
     for task in tasks:
@@ -90,70 +96,107 @@ def _batches(tasks: Iterable[Task], size: int) -> Iterator[tuple[Task, ...]]:
 
 
 class LocalPool(Pool):
-    """Processes on this machine, one a core unless told otherwise."""
+    """Processes on this machine, one a core unless told otherwise; one that ends or takes too long is replaced.
 
-    def __init__(self, workers: int | None = None) -> None:
+    Parameters
+    ----------
+    seconds : processor time that a task may take; one that takes more is not tried again.
+
+    Raises
+    ------
+    AppError
+        When a process cannot be started, or ends before it could begin.
+    """
+
+    def __init__(self, workers: int | None = None, seconds: float = TASK_S) -> None:
         self.size = workers or os.cpu_count() or 1
-        self._others = set(multiprocessing.active_children())
-        self._pool: ProcessPoolExecutor | None = None
-
-    def _executor(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(self.size, mp_context=multiprocessing.get_context("spawn"))
-        return self._pool
+        self._seconds = seconds
+        self._workers: list[_Busy] = []
+        self._again: deque[tuple[Task, ...]] = deque()
 
     def _finished(self, work: Work, recipe: Recipe, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
-        running: dict[Future[list[Record]], tuple[Task, ...]] = {}
         source = iter(batches)
-        while True:
-            while len(running) < AHEAD * self.size and (batch := next(source, None)) is not None:
-                running[self._submitted(work, recipe, batch)] = batch
-            if not running:
-                return
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                problem = future.exception()
-                records = future.result() if problem is None else None
-                yield Ended(running.pop(future), records, _line(problem))
+        try:
+            while True:
+                while (batch := self._next(source)) is not None:
+                    self._free().give(work, recipe, batch)
+                heard = {busy.worker.pipe: busy for busy in self._workers if busy.batches}
+                if not heard:
+                    return
+                for pipe in wait(heard):
+                    yield from self._heard(heard[cast(Connection, pipe)])
+        finally:
+            # Stopped halfway: later answers would be taken for those to something else.
+            if any(busy.batches for busy in self._workers):
+                self._end()
 
-    def _submitted(self, work: Work, recipe: Recipe, batch: tuple[Task, ...]) -> Future[list[Record]]:
-        with _quiet_children():
-            try:
-                return self._executor().submit(work, recipe, batch)
-            except BrokenProcessPool:
-                self._drop()
-                return self._executor().submit(work, recipe, batch)
+    def _next(self, source: Iterator[tuple[Task, ...]]) -> tuple[Task, ...] | None:
+        """A batch, while there are some and a worker has not enough."""
+        if len(self._workers) == self.size and all(len(busy.batches) >= AHEAD for busy in self._workers):
+            return None
+        return self._again.popleft() if self._again else next(source, None)
 
-    def _drop(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = None
+    def _free(self) -> _Busy:
+        """The worker that has least to do; a new one rather than one that has something."""
+        least = min(self._workers, key=lambda busy: len(busy.batches), default=None)
+        if least is None or (least.batches and len(self._workers) < self.size):
+            least = _Busy(Worker(self._seconds))
+            self._workers.append(least)
+        return least
+
+    def _heard(self, busy: _Busy) -> Iterator[Ended]:
+        """Take the next answer of a worker; what it left undone is given out again."""
+        answer = busy.worker.hear()
+        if isinstance(answer, Ready):
+            busy.ready = True
+        elif isinstance(answer, Made):
+            yield Ended((busy.answered(),), [answer.result])
+        else:
+            suspect, *rest = busy.batches.popleft()
+            self._again += [tuple(rest)] if rest else []
+            if isinstance(answer, Gone):
+                self._replace(busy)
+            if isinstance(answer, Gone) and answer.limited:
+                yield Ended((suspect,), [_lost(suspect, f"{answer.problem}; {SIMPLER}")])
+            else:
+                yield Ended((suspect,), None, answer.problem)
+
+    def _replace(self, busy: _Busy) -> None:
+        if not busy.ready:
+            raise AppError("a process ended before it could begin to work; is there memory left? try fewer --workers")
+        self._workers.remove(busy)
+        self._again += map(tuple, busy.batches)
+
+    def _end(self) -> None:
+        for busy in self._workers:
+            busy.worker.end()
+        self._workers.clear()
+        self._again.clear()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None and self._pool is not None:
-            self._pool.shutdown()
-            return
-        self._drop()
-        for child in set(multiprocessing.active_children()) - self._others:
-            child.terminate()
+        self._end()
 
 
-@contextmanager
-def _quiet_children() -> Iterator[None]:
-    """Processes started here leave Ctrl-C to this one, and do linear algebra on one core each."""
-    before = os.environ.get("OPENBLAS_NUM_THREADS")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = before
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+@dataclass(eq=False)
+class _Busy:
+    """A worker with the tasks it was given and has not answered, batch by batch."""
+
+    worker: Worker
+    batches: deque[deque[Task]] = field(default_factory=deque)
+    ready: bool = False
+
+    def give(self, work: Work, recipe: Recipe, batch: tuple[Task, ...]) -> None:
+        self.batches.append(deque(batch))
+        self.worker.give(work, recipe, batch)
+
+    def answered(self) -> Task:
+        """The task that was to be answered next; it is answered now."""
+        task = self.batches[0].popleft()
+        if not self.batches[0]:
+            self.batches.popleft()
+        return task
 
 
 class ClusterPool(Pool):
@@ -187,7 +230,7 @@ class ClusterPool(Pool):
         def submit() -> None:
             batch = next(source, None)
             if batch is not None:
-                future = self._client.submit(work, recipe, batch, pure=False, retries=RETRIES)
+                future = self._client.submit(all_of_batch, work, recipe, batch, pure=False, retries=RETRIES)
                 running[future.key] = batch
                 queue.add(future)
 
@@ -208,6 +251,4 @@ class ClusterPool(Pool):
 
 
 def _line(problem: BaseException | None) -> str:
-    if isinstance(problem, BrokenProcessPool):
-        return "the process that worked on it ended at once (out of memory?)"
     return "" if problem is None else f"{type(problem).__name__}: {' '.join(str(problem).split())}"[:300]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from drivers import Encoding, atomic_files, naming
+from drivers import Encoding, FileError, atomic_files, naming
 from planner import DEFAULT_CONTRAST_DB
 
 from .icon_journal import Journal
-from .icon_pool import Pool, Work
+from .icon_pool import TASK_S, Pool, Work
 from .icon_progress import icon_progress
 from .icon_report import IconsReport
 from .icon_set import Icon, Pattern, best_pattern, chosen_patterns, figure_of
@@ -28,6 +30,8 @@ Record = Mapping[str, Any]
 
 CANDIDATES, MORE_CANDIDATES = 64, 256
 BATCH, WAVE_BATCH = 16, 2
+# What a file system says when one name cannot be used and others can.
+NOT_A_NAME = {errno.EEXIST, errno.EILSEQ, errno.EINVAL, errno.EISDIR, errno.ENAMETOOLONG, errno.ENOTDIR}
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class IconOptions:
     closer_than : pairs of icons nearer than this are listed. dwell_s : length of a waveform's frame.
     tol : largest predicted error of an icon that is ok, full scale; None for any. budget_s : seconds for the work on
         the set; what is not begun then is left for the next run. None for any. yes : do not ask before very much.
+    icon_seconds : processor time that one icon may take, on this machine.
     """
 
     device: str = "paper-6x6"
@@ -55,6 +60,7 @@ class IconOptions:
     tol: float | None = None
     budget_s: float | None = None
     yes: bool = False
+    icon_seconds: float = TASK_S
 
 
 @dataclass
@@ -134,27 +140,36 @@ class IconRun:
         tasks, names = [], {}
         for icon in self.icons():
             task = self._pattern_task("wave", icon.name)
-            path = self.out / "waveforms" / f"{icon.name}.wav"
             names[task.key] = icon.name
             if icon.outcome != "ok":
                 continue
             noted = self.journal.find(f"wave:{icon.name}")
-            if noted and noted["made"] == task.key and path.is_file():
+            if noted and noted["made"] == task.key and os.path.isfile(self._wave(icon.name)):
                 self.waves[icon.name] = noted["file"]
             else:
                 tasks.append(task)
         for records in self._do(pool, write_waves, self.recipe, tasks, "writing", len(tasks), WAVE_BATCH):
             for record in records:
                 self._put_wave(names[record["key"]], record)
+        for key, problem in self.lost.items():
+            if key in names:
+                self.failed[names[key]] = problem
+
+    def _wave(self, name: str) -> Path:
+        return self.out / "waveforms" / f"{name}.wav"
 
     def _put_wave(self, name: str, record: Record) -> None:
         if "bad" in record:
             self.failed[name] = record["bad"]
             return
-        path = self.out / "waveforms" / f"{name}.wav"
-        with atomic_files(path, path.with_suffix(".json")) as (wav, manifest), naming(path):
-            wav.write(record["wav"])
-            manifest.write(record["json"])
+        path = self._wave(name)
+        try:
+            _put_pair(path, record["wav"], record["json"])
+        except FileError as error:
+            if error.errno not in NOT_A_NAME:
+                raise
+            self.failed[name] = str(error)
+            return
         self.waves[name] = path.relative_to(self.out).as_posix()
         self.journal.add({"key": f"wave:{name}", "made": record["key"], "file": self.waves[name]})
 
@@ -211,7 +226,8 @@ class IconRun:
         best = best_pattern(record, self.recipe.shape)
         pattern = self.chosen.get(name, best)
         same = np.array_equal(pattern.amplitude, best.amplitude)
-        plan = record["plan"] if same else self.journal.find(self._pattern_task("plan", name).key) or {}
+        key = self._pattern_task("plan", name).key
+        plan = record["plan"] if same else self.journal.find(key) or {"note": self.lost.get(key, "")}
         notes = list(record["notes"])
         if record["frames"] > 1:
             notes.append(f"the first of its {record['frames']} frames")
@@ -255,3 +271,12 @@ class IconRun:
             left = "; what is left is done by the same call again" if self.stopped else ""
             lines.append(f"Budget {options.budget_s:g} s: {'used up' if self.stopped else 'kept'}{left}.")
         return tuple(lines)
+
+
+def _put_pair(path: Path, samples: bytes, manifest: bytes) -> None:
+    """Put a waveform and its manifest in place, whole or not at all."""
+    aim = path, path.with_suffix(".json")
+    with atomic_files(*aim) as files:
+        for target, file, data in zip(aim, files, (samples, manifest), strict=True):
+            with naming(target):
+                file.write(data)

@@ -10,7 +10,7 @@ import hashlib
 import json
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -24,7 +24,7 @@ from drivers import DriverError, Encoding, write_waveform
 from encoders import EncodeError, Frame, GridShape, PictureOptions, Scene, TargetPattern, encode_picture
 from planner import Plan, PlanError, plan_scene
 
-__all__ = ["Recipe", "Task", "code_digest", "encode_icons", "plan_patterns", "write_waves"]
+__all__ = ["Recipe", "Record", "Task", "all_of_batch", "code_digest", "encode_icons", "plan_patterns", "write_waves"]
 
 Floats = NDArray[np.float64]
 Record = dict[str, Any]
@@ -98,16 +98,16 @@ class Task:
     name: str = ""
 
 
-def encode_icons(recipe: Recipe, tasks: Sequence[Task]) -> list[Record]:
+def encode_icons(recipe: Recipe, tasks: Sequence[Task]) -> Iterator[Record]:
     """Encode pictures and plan the best pattern of each.
 
-    Returns
-    -------
+    Yields
+    ------
     Records with ``kind``, ``frames`` (of an animation; the first is the icon), ``notes``, ``figure`` (bytes 0..255
     in base64), ``options`` (bits of the good patterns, each filled up to bytes, in base64), their ``similarity``,
     best first, and ``plan`` as of `plan_patterns`; or ``bad``, one line on what is wrong with the picture.
     """
-    return [_encoded(recipe, task) for task in tasks]
+    return (_encoded(recipe, task) for task in tasks)
 
 
 def _encoded(recipe: Recipe, task: Task) -> Record:
@@ -131,14 +131,21 @@ def _encoded(recipe: Recipe, task: Task) -> Record:
     }
 
 
-def plan_patterns(recipe: Recipe, tasks: Sequence[Task]) -> list[Record]:
+def plan_patterns(recipe: Recipe, tasks: Sequence[Task]) -> Iterator[Record]:
     """Plan patterns, each from rest: records with ``outcome``, ``error`` (full scale) and ``note``."""
-    return [{"key": task.key} | _planned(recipe, np.array(task.amplitude)) for task in tasks]
+    return ({"key": task.key} | _planned(recipe, np.array(task.amplitude)) for task in tasks)
 
 
-def write_waves(recipe: Recipe, tasks: Sequence[Task]) -> list[Record]:
+def write_waves(recipe: Recipe, tasks: Sequence[Task]) -> Iterator[Record]:
     """Write patterns as waveforms: records with the bytes of both files (``wav``, ``json``), or with ``bad``."""
-    return [_written(recipe, task) for task in tasks]
+    return (_written(recipe, task) for task in tasks)
+
+
+def all_of_batch(
+    work: Callable[[Recipe, Sequence[Task]], Iterable[Record]], recipe: Recipe, tasks: Sequence[Task]
+) -> list[Record]:
+    """All records of a batch at once, for where they cannot be had one by one."""
+    return list(work(recipe, tasks))
 
 
 def _written(recipe: Recipe, task: Task) -> Record:

@@ -32,7 +32,7 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
     Raises
     ------
     AppError
-        When there are no pictures, or no scheduler answers.
+        When there are no pictures, no process can be started, or no scheduler answers.
     ChainError, DriverError
         When the device cannot be used, or the disk refuses.
     """
@@ -51,7 +51,9 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
         go_on(extent_of([blank], device, Path("icon.wav"), options.encoding, len(places)), out, yes=options.yes)
     with naming(out):
         out.mkdir(parents=True, exist_ok=True)
-    pool: Pool = ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers)
+    pool: Pool = (
+        ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers, options.icon_seconds)
+    )
     with Journal(out / "journal.jsonl") as journal:
         run = IconRun(recipe, options, out, places, journal)
         try:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import AppError
 from .progress import progress
+from .workers import end_with_parent
 
 if TYPE_CHECKING:
     from chainsim import SettingSweep
@@ -136,7 +137,7 @@ def _solve_all(
                 _solve_part(sweep, stored, first, chunk, fields)
             return
         # A fresh interpreter each: a fork of a process with running threads may hang.
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
             jobs = [pool.submit(_solve_in_process, source, stored, first, chunk, fields) for first in todo]
             for done, job in enumerate(jobs):
                 update(done, len(todo))

@@ -23,13 +23,15 @@ NOT_A_FILE = "this is a device or a pipe; give the name of a file"
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Turn an OSError of the body into a FileError that names `path` and the cure."""
+    """Turn an OSError of the body into a FileError that names `path` and the cure, with the same `errno`."""
     try:
         yield
     except FileError:
         raise
     except OSError as error:
-        raise FileError(f"{path}: {_complaint(path, error)}") from None
+        refused = FileError(f"{path}: {_complaint(path, error)}")
+        refused.errno = error.errno
+        raise refused from None
 
 
 @contextmanager
@@ -207,6 +209,8 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.EACCES: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EPERM: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EROFS: f"folder {folder} is on a read-only file system; choose another folder",
+        errno.EEXIST: "a file of this name is in the way; give another name",
+        errno.ENAMETOOLONG: "the name is longer than the file system takes; shorten it",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
         errno.EEXIST: "there is a file of this name; choose another",
         errno.EISDIR: "this is a folder; give the name of a file",

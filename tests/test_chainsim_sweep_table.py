@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chainsim.sweeping.sweep_table import read_table
 
 from chainsim import ProfileError, read_sweep
+from chainsim.files.sweep_table import read_table
 
 CHAIN = "chain: {n: 3, delta: 6.0e-3, beta: -1.0}\nrung: harmonic_balance\ntol: 1.0e-6\n"
 
@@ -84,9 +84,9 @@ def test_csv_as_people_write_it(tmp_path: Path) -> None:
 def test_csv_of_too_many_numbers_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "t.csv"
     path.write_text("epsilon,omega\n" + "1,2\n" * 50)
-    monkeypatch.setattr("chainsim.sweeping.sweep_table.MOST_NUMBERS", 99)
+    monkeypatch.setattr("chainsim.files.sweep_table.MOST_NUMBERS", 99)
     assert "numbers; a table has at most 99; sweep it in parts" in refused(path)
-    monkeypatch.setattr("chainsim.sweeping.sweep_table.MOST_NUMBERS", 100)
+    monkeypatch.setattr("chainsim.files.sweep_table.MOST_NUMBERS", 100)
     assert len(read_table(path)["omega"]) == 50
     with path.open("wb") as file:
         file.truncate(10**12)
@@ -137,15 +137,15 @@ def of(shape: str) -> bytes:
 
 @pytest.mark.parametrize("shape", ["(1000000000000,)", "(3,)", "(-1,)", "(True,)", "(1.0,)", "3", "(" * 5000])
 def test_a_header_that_lies_takes_no_memory(tmp_path: Path, shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chainsim.sweeping.sweep_table._numbers", lambda *_: pytest.fail("it was read"))
+    monkeypatch.setattr("chainsim.files.sweep_table._numbers", lambda *_: pytest.fail("it was read"))
     assert refused(with_header(tmp_path / "t.npz", of(shape), bytes(16)))
 
 
 def test_an_archive_that_swells_is_refused_by_its_header(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("chainsim.sweeping.sweep_table._numbers", lambda *_: pytest.fail("it was read"))
+    monkeypatch.setattr("chainsim.files.sweep_table._numbers", lambda *_: pytest.fail("it was read"))
     path = with_header(tmp_path / "t.npz", of("(2000000,)"), bytes(16_000_000))
     assert path.stat().st_size < 20_000
-    monkeypatch.setattr("chainsim.sweeping.sweep_table.MOST_NUMBERS", 1_999_999)
+    monkeypatch.setattr("chainsim.files.sweep_table.MOST_NUMBERS", 1_999_999)
     assert refused(path) == ": 2000000 numbers; a table has at most 1999999; sweep it in parts"
 
 
