@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .complaints import complaint_of, shown, words_of
 from .errors import ChainError, ProfileError
 from .model.calibrated import Actuator, ActuatorSpread
 from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
@@ -86,6 +87,7 @@ __all__ = [
     "Tone",
     "balance_near",
     "bending_modes",
+    "complaint_of",
     "continue_branch",
     "critical_lam",
     "decide",
@@ -108,6 +110,7 @@ __all__ = [
     "read_simulation",
     "read_sweep",
     "rest_eigenvalues",
+    "shown",
     "simulate",
     "solve",
     "solve_with_terms",
@@ -118,6 +121,7 @@ __all__ = [
     "sweep",
     "two_tones",
     "unit_of",
+    "words_of",
 ]
 
 _LATE = {

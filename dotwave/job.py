@@ -9,7 +9,18 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, field_validator, model_validator
 
-from chainsim import Amplifier, Coupling, Device, Located, Span, load_device, read_located
+from chainsim import (
+    Amplifier,
+    Coupling,
+    Device,
+    Located,
+    Span,
+    complaint_of,
+    load_device,
+    read_located,
+    shown,
+    words_of,
+)
 from encoders import Fit, Invert, Output, PictureOptions, Presentation, RegionsBy, Style, Threshold, Undefined
 
 from .asked import TOLERANCES
@@ -36,7 +47,7 @@ MOST_ACTUATORS_A_SIDE = 1024
 
 def _whole(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_ACTUATORS_A_SIDE:
-        raise ValueError(f"expected a whole number from 1 to {MOST_ACTUATORS_A_SIDE}, got {value!r}")
+        raise ValueError(f"expected a whole number from 1 to {MOST_ACTUATORS_A_SIDE}, got {shown(value)}")
     return value
 
 
@@ -48,7 +59,7 @@ COLOUR = "auto|#[0-9a-fA-F]{6}"
 
 def _colour(value: str) -> str:
     if not re.fullmatch(COLOUR, value):
-        raise ValueError(f"expected auto or a colour such as '#ffffff', got {value!r}")
+        raise ValueError(f"expected auto or a colour such as '#ffffff', got {shown(value)}")
     return value
 
 
@@ -127,9 +138,9 @@ class DevicePart(Part):
         try:
             return Device.model_validate(profile)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            place = ".".join(str(part) for part in first["loc"])
-            raise ValueError(f"{place + ': ' if place else ''}{first['msg'].removeprefix('Value error, ')}") from None
+            first = complaint_of(error)
+            place = f"{words_of(first.place)}: " if first.place else ""
+            raise ValueError(f"{place}{first.sentence}") from None
 
 
 class TextPart(Part):
@@ -223,7 +234,7 @@ def _tolerance(value: Any) -> Any:
     except (TypeError, ValueError):
         number = math.nan
     if not 0 < number < math.inf:
-        raise ValueError(f"expected 'draft', 'normal', 'fine' or a number > 0 such as 1e-3, got {value!r}")
+        raise ValueError(f"expected 'draft', 'normal', 'fine' or a number > 0 such as 1e-3, got {shown(value)}")
     return number
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chainsim import Device, Outcome
+from chainsim import Device, Outcome, complaint_of
 
 from .channels import Channel, Role
 from .coupling import CouplingEvent
@@ -97,8 +97,8 @@ def read_manifest(path: Path) -> Manifest:
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise UnreadableWaveform(f"{path}: {_place(first['loc'])}: {_sentence(first)}") from None
+        first = complaint_of(error)
+        raise UnreadableWaveform(f"{path}: {_place(first.place)}: {first.sentence}") from None
     _Check(path, file.device).all(file)
     return _manifest(file)
 
@@ -109,13 +109,6 @@ def _no_constant(name: str) -> NoReturn:
 
 def _place(parts: tuple[str | int, ...]) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".") or "file"
-
-
-def _sentence(error: Any) -> str:
-    if error["type"] == "missing":
-        return "this key is required and missing"
-    shown = repr(error["input"])
-    return f"{error['msg']}, got {shown if len(shown) <= 60 else shown[:57] + '...'}"
 
 
 class _Check:

@@ -18,6 +18,9 @@ from .plan import ChainState, Ramp
 
 __all__ = ["PlanCache", "cache_path"]
 
+# How long another process may write before the cache is not waited for.
+PATIENCE_S = 2.0
+
 
 def cache_path() -> Path:
     """The cache's file: below DOTWAVE_CACHE, else XDG_CACHE_HOME, else ~/.cache."""
@@ -53,7 +56,7 @@ class PlanCache:
         self._scope = hashlib.sha256(_code_digest() + text.encode()).digest()
         if whole is not None:
             self._scope = hashlib.sha256(whole._scope + self._scope).digest()
-        self._file: CacheFile = CacheFile(cache_path()) if whole is None else whole._file
+        self._file: CacheFile = CacheFile(cache_path(), PATIENCE_S) if whole is None else whole._file
 
     def _key(self, item: bytes) -> bytes:
         return hashlib.sha256(self._scope + item).digest()

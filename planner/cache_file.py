@@ -19,8 +19,6 @@ log = logging.getLogger(__name__)
 
 LAYOUT = "CREATE TABLE plans (key BLOB PRIMARY KEY, value BLOB)"
 DIGEST_BYTES = 16
-# How long another process may write before the cache is not waited for.
-PATIENCE_S = 2.0
 # SQLite takes at least 999 values in one question.
 ASKED_AT_ONCE = 500
 # Codes of SQLite that speak of the file's content; others (locked, disk full, no permission) pass.
@@ -57,8 +55,9 @@ class CacheFile:
     another reason, or that is another program's database, is left as it is: nothing is then found. The log says so.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, patience_s: float) -> None:
+        """`patience_s` : how long another process may write before the file is not waited for."""
+        self._path, self._patience_s = path, patience_s
         self._connection: sqlite3.Connection | None = None
         self._identity: tuple[int, int] | None = None
         self._ours = self._remade = False
@@ -91,7 +90,7 @@ class CacheFile:
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._identity = _identity(self._path)
-            self._connection = _connected(self._path)
+            self._connection = _connected(self._path, self._patience_s)
             _lay_out(self._connection)
             self._identity, self._ours = _identity(self._path), True
         except ERRORS as error:
@@ -129,7 +128,7 @@ class CacheFile:
         os.close(made)
         aside = Path(name)
         try:
-            with closing(_connected(aside)) as new:
+            with closing(_connected(aside, self._patience_s)) as new:
                 _lay_out(new)
                 saved = _salvaged(old, new) if old is not None and self._ours else 0
             if self._ours:
@@ -153,8 +152,8 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def _connected(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
+def _connected(path: Path, patience_s: float) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, timeout=patience_s, isolation_level=None, check_same_thread=False)
     # A damaged text need not be UTF-8.
     connection.text_factory = bytes
     connection.execute("PRAGMA synchronous = OFF")

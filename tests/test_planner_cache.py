@@ -231,9 +231,9 @@ PROCESS = """
 import sys, numpy as np
 from chainsim import load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
-from planner import cache_file, plan_scene
+from planner import cache, plan_scene
 # Neither gives up on the other, however seldom it gets the processor.
-cache_file.PATIENCE_S = 600.0
+cache.PATIENCE_S = 600.0
 dots = np.random.default_rng(int(sys.argv[1])).integers(0, 2, (40, 6, 6)).astype(complex)
 scene = Scene(GridShape(6, 6), [Frame(TargetPattern(d), 1.0) for d in dots])
 print(sum(len(f.states) for f in plan_scene(scene, load_device("linked-6x6")).frames))

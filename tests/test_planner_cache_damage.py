@@ -233,7 +233,7 @@ def test_a_locked_file_is_left_alone(
     items: Items, folder: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = kept(items)
-    monkeypatch.setattr("planner.cache_file.PATIENCE_S", 0.0)
+    monkeypatch.setattr("planner.cache.PATIENCE_S", 0.0)
     with closing(sqlite3.connect(cache_path(), isolation_level=None)) as connection:
         connection.execute("BEGIN EXCLUSIVE")
         cache = PlanCache(LINKED, CONTRAST_DB)

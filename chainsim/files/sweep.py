@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 
 from ..errors import ProfileError
 from ..model.chain import Chain, Setting
-from ..rung import Start
 from ..yamlfile import read_model
 from .chain_section import ChainSection
 from .sweep_table import AXES, read_table
@@ -89,7 +88,7 @@ class _File(_Part):
     setting: _Setting
     rung: Literal["auto", "harmonic_balance"] = "auto"
     tol: Annotated[float, Field(ge=1e-12, le=1)]
-    start: Literal[Start.REST] = Start.REST
+    start: Literal["rest"] = "rest"
 
 
 @dataclass(frozen=True)

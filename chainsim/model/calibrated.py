@@ -7,12 +7,14 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Actuator", "ActuatorSpread", "PlusMinus", "misplaced"]
+__all__ = ["Actuator", "ActuatorSpread", "PlusMinus", "far_off", "misplaced"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+# Of a natural frequency from the profile's, up and down.
+FARTHEST = 1000.0
 Place = Annotated[int, Field(ge=0, le=1023)]
 
 
@@ -69,6 +71,15 @@ class ActuatorSpread(_Part):
     damping: Share = 0.0
     beta: Share = 0.0
     lam: Share = 0.0
+
+
+def far_off(actuators: Iterable[Actuator], f0_hz: float) -> str:
+    """Which natural frequency cannot be one of a device whose profile says `f0_hz`, or ""."""
+    for index, one in enumerate(actuators):
+        if one.f0_hz is not None and not f0_hz / FARTHEST <= one.f0_hz <= f0_hz * FARTHEST:
+            wanted = f"expected within {FARTHEST:g} times the profile's {f0_hz:g}"
+            return f"actuators.{index}.f0_hz: {wanted}, got {one.f0_hz:g}"
+    return ""
 
 
 def misplaced(actuators: Iterable[Actuator], rows: int, cols: int, chain_length: int) -> str:

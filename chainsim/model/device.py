@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..errors import ProfileError
 from ..yamlfile import read_model
-from .calibrated import Actuator, ActuatorSpread, misplaced
+from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
 from .chain import Chain, Closure
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
@@ -162,6 +162,7 @@ class Device(_Part):
         if self.coupling.scope == "none" and self.chain_length > 1:
             raise ValueError("coupling.scope none needs chain_length 1")
         wrong = misplaced(self.actuators, self.rows, self.cols, self.chain_length)
+        wrong = wrong or far_off(self.actuators, self.f0_hz)
         if wrong:
             raise ValueError(wrong)
         unknown = sorted(set(self.notes) - set(type(self).model_fields))
