@@ -11,6 +11,7 @@ from .model.calibrated import Actuator, ActuatorSpread
 from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
+from .npy_header import NpyHeader, read_npy_header
 from .rung import RUNGS, Rung, RungError, Start, load_rung
 from .yamlfile import Located, parse_model, read_located, read_model
 
@@ -67,6 +68,7 @@ __all__ = [
     "Located",
     "Mode",
     "Note",
+    "NpyHeader",
     "Outcome",
     "Play",
     "ProfileError",
@@ -107,6 +109,7 @@ __all__ = [
     "reached_from_rest",
     "read_located",
     "read_model",
+    "read_npy_header",
     "read_simulation",
     "read_sweep",
     "rest_eigenvalues",

@@ -63,12 +63,12 @@ def read_exchange(path: Path | str) -> HapticCurves:
         _suffix(path)
     ]
     with naming(path):
-        text = path.read_text("utf-8")
+        raw = path.read_bytes()
     try:
-        return reader(json.loads(text))
+        return reader(json.loads(raw))
     except KeyError as error:
         raise UnreadableWaveform(f"{path}: the key {error} is missing") from None
-    except (ValueError, TypeError, IndexError) as error:
+    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
         raise UnreadableWaveform(f"{path}: {error}") from None
 
 

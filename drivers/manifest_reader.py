@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chainsim import Device, Outcome, complaint_of
+from chainsim import Device, Outcome, complaint_of, shown
 
 from .channels import Channel, Role
 from .coupling import CouplingEvent
@@ -21,8 +21,11 @@ from .manifest import FrameMark, Manifest
 
 __all__ = ["read_manifest"]
 
+# As many as an amplifier has; as many as a file of 64 bits can hold.
+MOST_HZ = 10_000_000
+MOST_SAMPLES = 1 << 60
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0)]
 
@@ -65,11 +68,11 @@ class _Frame(_Part):
 class _File(_Part):
     schema_: Literal["dotwave/waveform/1"] = Field(alias="schema")
     samples_file: Annotated[str, Field(min_length=1)]
-    rate_hz: Annotated[int, Field(ge=1)]
-    samples: Index
+    rate_hz: Annotated[int, Field(ge=1, le=MOST_HZ)]
+    samples: Annotated[int, Field(ge=0, le=MOST_SAMPLES)]
     digest: Annotated[str, Field(pattern="^sha256:[0-9a-f]{64}$")]
     device: Device
-    channels: list[_Channel]
+    channels: Annotated[list[_Channel], Field(min_length=1)]
     coupling: list[_Event]
     frames: list[_Frame]
     encoding: dict[str, Any] = {}
@@ -119,8 +122,8 @@ class _Check:
         self._device = device
 
     def all(self, file: _File) -> None:
-        if Path(file.samples_file).name != file.samples_file:
-            self._refuse("samples_file", f"expected a name without folders, got {file.samples_file!r}")
+        if Path(file.samples_file).name != file.samples_file or "\0" in file.samples_file:
+            self._refuse("samples_file", f"expected a name without folders, got {shown(file.samples_file)}")
         self._channels(file.channels)
         last = [0.0] * self._device.rows
         for index, event in enumerate(file.coupling):

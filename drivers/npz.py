@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,8 @@ from typing import IO, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
+from chainsim import NpyHeader, read_npy_header
 
 from .channels import Channel
 from .errors import UnreadableWaveform
@@ -24,6 +26,11 @@ __all__ = ["NpzReader", "NpzWriter"]
 Floats = NDArray[np.float64]
 
 VOLTS, RATE = "volts.npy", "rate_hz.npy"
+LONGEST_RATE = 16
+# What zipfile raises on what is not a ZIP, or not a whole one.
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, EOFError, ValueError, LookupError, OverflowError, NotImplementedError, RuntimeError,
+)  # fmt: skip
 
 
 class NpzWriter:
@@ -81,19 +88,20 @@ class NpzReader:
         FileError, UnreadableWaveform
             When it cannot be read, or does not hold float64 volts of so many channels and a rate.
         """
-        with naming(path):
-            file = path.open("rb")
         try:
-            with file, zipfile.ZipFile(file) as archive:
+            with naming(path), path.open("rb") as file, zipfile.ZipFile(file) as archive:
                 with archive.open(VOLTS) as member:
-                    shape = _header(member)
+                    volts = _header(member)
                 with archive.open(RATE) as member:
-                    rate = np.lib.format.read_array(io.BytesIO(member.read(4096)), allow_pickle=False)
-        except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError, RuntimeError) as error:
+                    header = read_npy_header(member)
+                    raw = member.read(LONGEST_RATE)
+        except DAMAGED as error:
             raise UnreadableWaveform(f"{path}: not an NPZ with volts and rate_hz: {error}") from None
-        if len(shape) != 2 or shape[1] != len(channels) or rate.shape != () or rate.dtype.kind not in "iu":
-            raise UnreadableWaveform(f"{path}: expected volts of {len(channels)} channels and a whole rate_hz")
-        return cls(path, int(rate), shape[0], len(channels))
+        whole = header.shape == () and header.dtype.kind in "iu" and len(raw) == header.dtype.itemsize
+        rate = int(np.frombuffer(raw, header.dtype)[0]) if whole else 0
+        if len(volts.shape) != 2 or volts.shape[1] != len(channels) or rate < 1:
+            raise UnreadableWaveform(f"{path}: expected volts of {len(channels)} channels and a whole rate_hz >= 1")
+        return cls(path, rate, volts.shape[0], len(channels))
 
     def blocks(self, block: int) -> Iterator[Floats]:
         """The samples from the start, float64, shape (S, channels), volts.
@@ -105,25 +113,28 @@ class NpzReader:
         """
         with naming(self.path):
             file = self.path.open("rb")
-        with file, zipfile.ZipFile(file) as archive, archive.open(VOLTS) as member:
-            _header(member)
-            for first in range(0, self.samples, block):
-                wanted = 8 * self.channels * min(block, self.samples - first)
-                try:
-                    raw = member.read(wanted)
-                except zipfile.BadZipFile as error:
-                    raise UnreadableWaveform(f"{self.path}: damaged: {error}") from None
-                if len(raw) < wanted:
-                    raise UnreadableWaveform(f"{self.path}: it ends early")
-                values = np.frombuffer(raw, dtype="<f8").astype(np.float64).reshape(-1, self.channels)
-                check_finite(self.path, values, first, self.rate_hz)
-                yield values
+        try:
+            with file, zipfile.ZipFile(file) as archive, archive.open(VOLTS) as member:
+                _header(member)
+                for first in range(0, self.samples, block):
+                    yield self._block(member, first, min(block, self.samples - first))
+        except UnreadableWaveform:
+            raise
+        except DAMAGED as error:
+            raise UnreadableWaveform(f"{self.path}: damaged: {error}") from None
+
+    def _block(self, member: IO[bytes], first: int, samples: int) -> Floats:
+        with naming(self.path):
+            raw = member.read(8 * self.channels * samples)
+        if len(raw) < 8 * self.channels * samples:
+            raise UnreadableWaveform(f"{self.path}: it ends early")
+        values = np.frombuffer(raw, dtype="<f8").astype(np.float64).reshape(-1, self.channels)
+        check_finite(self.path, values, first, self.rate_hz)
+        return values
 
 
-def _header(member: IO[bytes]) -> tuple[int, ...]:
-    version = np.lib.format.read_magic(member)
-    read = np.lib.format.read_array_header_2_0 if version[0] >= 2 else np.lib.format.read_array_header_1_0
-    shape, fortran, dtype = read(member)
-    if fortran or dtype != np.dtype("<f8"):
-        raise ValueError(f"volts are {dtype}, expected little-endian float64 in C order")
-    return tuple(int(length) for length in shape)
+def _header(member: IO[bytes]) -> NpyHeader:
+    header = read_npy_header(member)
+    if header.fortran or header.dtype != np.dtype("<f8"):
+        raise ValueError(f"volts are {header.dtype}, expected little-endian float64 in C order")
+    return header

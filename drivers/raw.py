@@ -79,10 +79,10 @@ class RawReader:
                     raw = file.read(4 * wanted)
                 if len(raw) < 4 * wanted:
                     raise UnreadableWaveform(f"{self.path}: it ends early")
-                with np.errstate(invalid="ignore"):
-                    values = np.frombuffer(raw, dtype="<f4").astype(np.float64).reshape(-1, len(self.unit))
+                with np.errstate(invalid="ignore", over="ignore"):
+                    values = np.frombuffer(raw, dtype="<f4").astype(np.float64).reshape(-1, len(self.unit)) * self.unit
                 check_finite(self.path, values, first, self.rate_hz)
-                yield values * self.unit
+                yield values
 
 
 def check_finite(path: Path, values: Floats, first: int, rate_hz: int) -> None:

@@ -108,9 +108,10 @@ class WavReader:
                     raw = file.read(wanted)
                 if len(raw) < wanted:
                     raise _bad(self.path, f"it ends early, at sample {first + len(raw) // align} of {self.samples}")
-                values = _decode(raw, self.encoding).reshape(-1, self.channels)
+                with np.errstate(over="ignore"):
+                    values = _decode(raw, self.encoding).reshape(-1, self.channels) * self.volts_per_unit
                 self._check_finite(values, first)
-                yield values * self.volts_per_unit
+                yield values
 
     def _check_finite(self, values: Floats, first: int) -> None:
         if not np.isfinite(values).all():
