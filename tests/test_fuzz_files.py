@@ -53,7 +53,8 @@ SMALL = LINKED.model_copy(update={"rows": 1, "cols": 2, "chain_length": 2})
 # What the libraries say where our own words are missing.
 LEAKS = re.compile(
     r"Input should|Value error|Assertion failed|Extra inputs|Field required|List should|String should|Tuple should|"
-    r"Dictionary should|Unable to|union_tag|Traceback| at 0x[0-9a-f]{6,}|<[A-Z]\w+[.:]|\w+Error\b|constrained-|function-"
+    r"Dictionary should|Unable to|union_tag|Traceback| at 0x[0-9a-f]{6,}|<[A-Z]\w+[.:]|\w+Error\b|constrained-|"
+    r"function-"
 )
 
 ODD: list[Any] = [
@@ -288,7 +289,9 @@ SWEEP = {
 
 
 def _kinds_of_yaml() -> dict[str, Kind]:
-    profiles = [(ROOT / "chainsim" / "profiles" / f"{name}.yaml").read_bytes() for name in ("paper-6x6", "linked-6x6")]
+    profiles = [
+        (ROOT / "chainsim" / "model" / "profiles" / f"{name}.yaml").read_bytes() for name in ("paper-6x6", "linked-6x6")
+    ]
     measured = LINKED.as_dict() | {
         "actuators": [{"row": 0, "col": 0, "f0_hz": 130.0, "plus_minus": {"f0_hz": 1.0}}],
         "spread": {"frequency": 0.1, "lam": 0.1},

@@ -25,7 +25,7 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "jobs" / "own.txt").write_text("Hello", encoding="utf-8")
     (tmp_path / "jobs" / "own.utb").write_text("include ../secret\n", encoding="utf-8")
     (tmp_path / "jobs" / "heart.svg").write_bytes((ROOT / "samples" / "icons" / "heart.svg").read_bytes())
-    profile = (ROOT / "chainsim" / "profiles" / "linked-6x6.yaml").read_text(encoding="utf-8")
+    profile = (ROOT / "chainsim" / "model" / "profiles" / "linked-6x6.yaml").read_text(encoding="utf-8")
     (tmp_path / "jobs" / "mine.yaml").write_text(profile.replace("name: linked-6x6", "name: mine"), encoding="utf-8")
     os.mkfifo(tmp_path / "jobs" / "pipe")
     monkeypatch.chdir(tmp_path / "cwd")
