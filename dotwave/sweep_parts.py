@@ -13,11 +13,11 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import Any
 
-from drivers import Part, held, part_of, settled
+from drivers import Part, held, is_at, part_of, settled
 
 from .errors import AppError
 
-__all__ = ["CHUNK", "claimed", "removed"]
+__all__ = ["claimed", "removed"]
 
 NOTE = "sweep.json"
 CHUNK = re.compile(r"\d{12}\.npz")
@@ -51,7 +51,7 @@ def claimed(folder: Path, note: Mapping[str, Any]) -> Iterator[None]:
                 continue  # another run came to its end and took the folder away
             if number is not None and held(number) is False:
                 raise AppError(f"{folder}: another run is at this sweep; wait for it, or give -o another name")
-            if number is None or _is_at(folder, number):
+            if number is None or is_at(folder, number):
                 if _read(folder) != note:
                     raise AppError(f"{folder}: left by another sweep; finish that one, or delete the folder")
                 yield
@@ -67,11 +67,9 @@ def removed(folder: Path, firsts: range) -> None:
         # Aside first: an empty folder of that name would not be known as ours.
         aside = _aside(folder)
         os.rename(folder, aside)
-        (aside / NOTE).unlink()
-        try:
-            aside.rmdir()
-        except OSError:
-            os.rename(aside, folder)  # something has come in between
+        _discard(aside)
+        with suppress(FileNotFoundError):
+            os.rename(aside, folder)  # something came in between
     else:
         (folder / NOTE).unlink()
 
@@ -89,23 +87,32 @@ def _make(folder: Path, note: Mapping[str, Any]) -> None:
             number = _opened(aside, stack)
         except FileNotFoundError:
             return  # another run took it for one of a dead run; try again
-        if number is not None and (held(number) is False or not _is_at(aside, number)):
+        if number is not None and (held(number) is False or not is_at(aside, number)):
             return
-        with (aside / NOTE).open("xb") as file:
-            file.write(json.dumps(dict(note)).encode())
-            file.flush()
-            os.fsync(file.fileno())
         try:
+            with (aside / NOTE).open("xb") as file:
+                file.write(json.dumps(dict(note)).encode())
+                file.flush()
+                os.fsync(file.fileno())
             os.rename(aside, folder)
         except OSError:
-            (aside / NOTE).unlink()
-            aside.rmdir()
             if not os.path.lexists(folder):
-                raise
+                raise  # else another run was first
+        finally:
+            _discard(aside)
+
+
+def _discard(aside: Path) -> None:
+    """Delete a folder with nothing but a note in it, if it is there."""
+    with suppress(OSError):
+        (aside / NOTE).unlink(missing_ok=True)
+        aside.rmdir()
 
 
 def _clear(folder: Path) -> None:
     """Remove folders that dead runs of this user were making, or taking away."""
+    if sys.platform == "win32":
+        return
     with suppress(OSError):
         for name in os.listdir(folder.parent):
             part, path = part_of(folder.parent / name), folder.parent / name
@@ -116,9 +123,8 @@ def _clear(folder: Path) -> None:
                 if not S_ISDIR(seen.st_mode) or seen.st_uid != os.geteuid():
                     continue
                 number = _opened(path, stack)
-                if number is not None and held(number) is True and _is_at(path, number):
-                    (path / NOTE).unlink(missing_ok=True)
-                    path.rmdir()
+                if number is not None and held(number) is True and is_at(path, number):
+                    _discard(path)
 
 
 def _check_made(folder: Path, schema: str) -> None:
@@ -144,10 +150,3 @@ def _opened(folder: Path, stack: ExitStack) -> int | None:
     number = os.open(folder, FOLDER)
     stack.callback(os.close, number)
     return number
-
-
-def _is_at(folder: Path, number: int) -> bool:
-    try:
-        return os.path.samestat(folder.lstat(), os.fstat(number))
-    except OSError:
-        return False

@@ -14,7 +14,7 @@ from .locks import held
 from .manifest import FrameMark, Manifest
 from .manifest_reader import read_manifest
 from .pair import WrittenWaveform, read_waveform, write_waveform
-from .parts import Part, part_of
+from .parts import Part, is_at, part_of
 from .samples import EXCHANGE_SUFFIXES, SUFFIXES, SampleReader, SampleWriter
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
@@ -104,6 +104,7 @@ __all__ = [
     "channels_of",
     "grid_line",
     "held",
+    "is_at",
     "made_folder",
     "naming",
     "parse_outputs",

@@ -100,7 +100,8 @@ def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[B
     folder, token = paths[0].parent, secrets.token_hex(8)
     parts = [Part(path, token) for path in paths]
     files: list[BinaryIO] = []
-    _tidy(paths, belongs or {path.name for path in paths}.__contains__)
+    place = os.path.abspath(folder)
+    _tidy(place, paths, belongs or {path.name for path in paths}.__contains__)
     try:
         try:
             for part in parts:
@@ -118,7 +119,8 @@ def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[B
             # Closing flushes what is left of a write that came to nothing: on a full disk that fails again.
             with suppress(OSError):
                 file.close()
-    _remember(folder, alone)
+    # What this process itself did to the folder is no reason to look through it again.
+    _known[place] = (_changed(folder) if alone else None, _known[place][1])
 
 
 def settled(path: Path, belongs: Belongs) -> None:
@@ -144,6 +146,7 @@ def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
     last = parts[-1]
     with naming(last.path):
         os.replace(last.part, last.ready if len(parts) > 1 else last.path)
+    # After a power cut, too: should the names be lost that come after this, they are given again.
     sync_folder(last.path.parent)
 
 
@@ -174,23 +177,17 @@ def _check_target(path: Path) -> None:
 _known: dict[str, tuple[int | None, frozenset[str]]] = {}
 
 
-def _tidy(paths: Sequence[Path], belongs: Belongs) -> None:
+def _tidy(place: str, paths: Sequence[Path], belongs: Belongs) -> None:
     """Settle what dead processes left of these files, and delete what else they left in the folder."""
     folder = paths[0].parent
     if any(path.parent != folder for path in paths):
         raise ValueError(f"files written together lie in one folder, got {[str(path) for path in paths]}")
-    changed, waiting = _known.get(os.path.abspath(folder), (None, frozenset()))
+    changed, waiting = _known.get(place, (None, frozenset()))
     if changed is not None and changed == _changed(folder) and not any(map(belongs, waiting)):
         return
     with naming(paths[-1]):
         waiting = settle(folder, belongs, others=True)
-    _known[os.path.abspath(folder)] = (_changed(folder), waiting)
-
-
-def _remember(folder: Path, alone: bool) -> None:
-    """What this process itself did to the folder is no reason to look through it again."""
-    _, waiting = _known[os.path.abspath(folder)]
-    _known[os.path.abspath(folder)] = (_changed(folder) if alone else None, waiting)
+    _known[place] = (_changed(folder), waiting)
 
 
 def _changed(folder: Path) -> int | None:
@@ -213,6 +210,7 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.ENAMETOOLONG: "the name is longer than the file system takes; shorten it",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
         errno.EEXIST: "there is a file of this name; choose another",
+        errno.ENAMETOOLONG: "the name is too long; shorten it",
         errno.EISDIR: "this is a folder; give the name of a file",
     }
     if error.errno == errno.ENOENT:

@@ -88,7 +88,6 @@ def finish(parts: Sequence[Part]) -> None:
     for one, lies in [*((one, one.part) for one in parts), *((one, one.ready) for one in parts)]:
         with suppress(FileNotFoundError):
             os.replace(lies, one.path)
-    sync_folder(parts[0].path.parent)
 
 
 def settle(folder: Path, belongs: Belongs, *, others: bool) -> frozenset[str]:
