@@ -2,8 +2,14 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from chainsim import ProfileError, simulate
@@ -252,3 +258,20 @@ def test_chains_that_do_not_fit_together(source, tmp_path, old, new, complaint):
     source.write_text(TEXT.replace(old, new, 1))
     with pytest.raises(ProfileError, match=complaint):
         run_sweep(source, tmp_path / "out.npz")
+
+
+def test_no_worker_outlives_a_sweep_that_is_killed(source, tmp_path):
+    source.write_text(TEXT.replace("steps: 5", "steps: 100_000"))
+    command = [sys.executable, "-m", "dotwave", "sweep", source, "-o", tmp_path / "out.npz", "--workers", "2"]
+    with subprocess.Popen(command, env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}) as running:
+        until = time.monotonic() + 120
+        # Two workers, and the process that tidies up after all of them.
+        while len(workers := psutil.Process(running.pid).children(recursive=True)) < 3:
+            assert running.poll() is None
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        running.kill()
+    _, alive = psutil.wait_procs(workers, 120)
+    for one in alive:
+        one.kill()
+    assert not alive
