@@ -46,7 +46,8 @@ class PictureLimits:
     file_bytes : size of the file. pixels : width times height of a JPEG; three tenths of it for
         other kinds, an animation's frames together.
     frames : frames of an animation. svg_bytes : size of an SVG when unpacked.
-    svg_elements : elements an SVG draws, those by reference counted each time.
+    svg_elements : elements an SVG draws, those by reference counted each time. svg_points : points of its only path;
+        of several paths the root of the sum of their squares, which is what the time to draw them grows with.
     """
 
     file_bytes: int = 64_000_000
@@ -54,6 +55,7 @@ class PictureLimits:
     frames: int = 500
     svg_bytes: int = 1_000_000
     svg_elements: int = 20_000
+    svg_points: int = 20_000
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import base64
 import io
 import re
-from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import unquote_to_bytes
 from xml.etree.ElementTree import ParseError, XMLParser
 from xml.sax.saxutils import escape, quoteattr
 
 from .picture_errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge, RendererMissing
+from .vector_weight import DEEPEST, STYLES, Weight, Weights
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -37,11 +37,12 @@ GEOMETRY = {
     "cx", "cy", "d", "fr", "fx", "fy", "gradientTransform", "height", "points", "r", "rx", "ry", "stroke-width",
     "style", "transform", "viewBox", "width", "x", "x1", "x2", "y", "y1", "y2",
 }  # fmt: skip
+PATHS = ("d", "points")
 # Dashes are felt as lines, so they are drawn as such.
 DROPPED = ("stroke-dash", "marker", "filter", "on")
-STYLES = "\0styles"  # stands for all style sheets: any of their rules may apply to any element
-DEEPEST = 48
 LARGEST = 1e6
+# What is told of a document with very many or very long names.
+MOST_NOTES, LONGEST_NAME = 20, 40
 EMBEDDED_PIXELS = 4_000_000
 EMBEDDED_LONGEST = 512
 
@@ -68,7 +69,7 @@ def draw_svg(name: str, data: bytes, longest_px: int, limits: PictureLimits) -> 
     PictureBroken
         When it is not XML, not SVG, or the renderer refuses it.
     PictureTooLarge
-        When it has more shapes, or greater numbers, than the limits allow.
+        When it has more shapes or points, or greater numbers, than the limits allow.
     RendererMissing
         When resvg-py is not installed.
     """
@@ -118,21 +119,25 @@ def tame_svg(name: str, data: bytes, limits: PictureLimits) -> tuple[str, tuple[
         if isinstance(error, PictureError):
             raise type(error)(f"{name}: {error}") from None
         raise PictureBroken(f"{name}: not XML: {' '.join(str(error).split())[:120]}") from None
-    elements = tamer.elements_drawn()
-    if elements > limits.svg_elements:
-        raise PictureTooLarge(f"{name}: draws more than {limits.svg_elements} elements; simplify the drawing")
-    if not elements:
-        left_out = f" ({'; '.join(tamer.notes)})" if tamer.notes else ""
-        raise EmptyPicture(f"{name}: the SVG draws no shape{left_out}; turn text into paths")
+    _check(name, tamer, limits)
     return "".join(tamer.out), tuple(tamer.notes)
 
 
-@dataclass
-class _Part:
-    """What an identified part, or the whole, draws: elements of its own, and parts it refers to."""
-
-    elements: int = 0
-    refers: list[str] = field(default_factory=list)
+def _check(name: str, tamer: _Tamer, limits: PictureLimits) -> None:
+    try:
+        drawn = tamer.drawn()
+    except PictureTooLarge as error:
+        raise PictureTooLarge(f"{name}: {error}") from None
+    if drawn.elements > limits.svg_elements:
+        raise PictureTooLarge(f"{name}: draws more than {limits.svg_elements} elements; simplify the drawing")
+    if drawn.points > limits.svg_points:
+        raise PictureTooLarge(
+            f"{name}: its paths take as long as one of {drawn.points} points; at most {limits.svg_points} are drawn, "
+            "simplify the drawing"
+        )
+    if not drawn.elements:
+        left_out = f" ({'; '.join(tamer.notes)})" if tamer.notes else ""
+        raise EmptyPicture(f"{name}: the SVG draws no shape{left_out}; turn text into paths")
 
 
 class _Tamer:
@@ -143,7 +148,7 @@ class _Tamer:
         self.out: list[str] = []
         self.notes: dict[str, None] = {}
         self._open: list[str] = []
-        self._parts: dict[str, _Part] = defaultdict(_Part)
+        self._weights = Weights()
         self._owners: list[str] = [""]
         self._draws = False
         self._skipping = 0
@@ -156,15 +161,17 @@ class _Tamer:
             return
         space, _, name = tag.rpartition("}")
         if not self._open and name != "svg":
-            raise PictureBroken(f"the outermost element is <{name}>, not <svg>; {'' if space else 'give an SVG'}")
+            raise PictureBroken(
+                f"the outermost element is <{name[:LONGEST_NAME]}>, not <svg>; {'' if space else 'give an SVG'}"
+            )
         known = space in {"", "{" + SVG}
         if known and name == "pattern" and "id" in attributes:
-            self.notes["patterns are drawn as grey"] = None
+            self._note("patterns are drawn as grey")
             ident = quoteattr(attributes["id"])
             self._write(f'<linearGradient id={ident}><stop stop-color="#808080"/></linearGradient>')
         if not known or name not in KEPT:
             if known and name not in SILENT:
-                self.notes[f"<{name}> is left out"] = None
+                self._note(f"<{name[:LONGEST_NAME]}> is left out")
             self._skipping = 1
             return
         if len(self._open) >= DEEPEST:
@@ -191,30 +198,19 @@ class _Tamer:
         """Keep style sheets; other text draws nothing."""
         if not self._skipping and self._open and self._open[-1] == "style":
             text = self._css(text)
-            self._parts[STYLES].refers += self._links(text)
+            self._weights.add(STYLES, Weight(), self._links(text))
             self._write(escape(text))
 
     def close(self) -> None:
         """End of the document."""
 
-    def elements_drawn(self) -> int:
-        """Elements in all, references followed, 0 when there is no shape; stops counting above the limit."""
-        if not self._draws:
-            return 0
-        sums: dict[str, int] = {}
+    def drawn(self) -> Weight:
+        """What is drawn in all, references followed; nothing when there is no shape."""
+        return self._weights.total() if self._draws else Weight()
 
-        def drawn(ident: str, above: frozenset[str]) -> int:
-            if ident in above or ident not in self._parts:
-                return 0
-            if ident not in sums:
-                part = self._parts[ident]
-                if len(above) > DEEPEST:
-                    raise PictureTooLarge(f"more than {DEEPEST} references to references; flatten the drawing")
-                total = part.elements + sum(drawn(other, above | {ident}) for other in part.refers)
-                sums[ident] = min(total, self.limits.svg_elements + 1)
-            return sums[ident]
-
-        return sum(drawn(ident, frozenset()) for ident in list(self._parts))
+    def _note(self, words: str) -> None:
+        if len(self.notes) < MOST_NOTES:
+            self.notes[words] = None
 
     def _write(self, text: str) -> None:
         self._length += len(text)
@@ -224,16 +220,15 @@ class _Tamer:
 
     def _count(self, name: str, attributes: dict[str, str]) -> None:
         owner, parent = self._owners[-1], self._owners[-2]
-        part = self._parts[owner]
-        part.elements += 1
         self._draws |= name in SHAPES
-        part.refers += [target for value in attributes.values() for target in self._links(value)]
-        part.refers.append(STYLES)
+        links = [target for value in attributes.values() for target in self._links(value)]
         link = attributes.get("href", attributes.get(XLINK_HREF, ""))
         if link.startswith("#"):
-            part.refers.append(link[1:])
+            links.append(link[1:])
+        points = sum(len(_NUMBER.findall(attributes.get(key, ""))) for key in PATHS) // 2
+        self._weights.add(owner, Weight(1, points**2), [*links, STYLES])
         if owner != parent:
-            self._parts[parent].refers.append(owner)
+            self._weights.add(parent, Weight(), [owner])
 
     @staticmethod
     def _links(text: str) -> list[str]:
@@ -246,7 +241,7 @@ class _Tamer:
                 if value.startswith("#") or (name == "image" and value.lstrip()[:5].lower() == "data:"):
                     kept["href"] = value
                 elif name in SHAPES:
-                    self.notes["references outside the document are not followed"] = None
+                    self._note("references outside the document are not followed")
             elif "}" not in key and not key.startswith(DROPPED):
                 kept[key] = self._css(value) if key == "style" or "url" in value else value
                 if key in GEOMETRY:
@@ -286,7 +281,7 @@ class _Tamer:
         except PictureTooLarge:
             raise
         except (*BROKEN, Image.DecompressionBombError):
-            self.notes["<image> is left out"] = None
+            self._note("<image> is left out")
             return False
         plain.thumbnail((EMBEDDED_LONGEST, EMBEDDED_LONGEST))
         buffer = io.BytesIO()

@@ -157,9 +157,18 @@ def nested(count: int) -> str:
     return f'<defs><g id="a0">{DOT}</g>{chain}</defs><use href="#a{count - 1}"/>'
 
 
+def zigzag(points: int) -> str:
+    return "M" + " ".join(f"{number % 8} {number % 7}" for number in range(points))
+
+
 @pytest.mark.parametrize(
     ("body", "error", "says"),
     [
+        (f'<path d="{zigzag(20_001)}"/>', PictureTooLarge, "of 20001 points; at most 20000 are drawn, simplify"),
+        (f'<polygon points="{zigzag(20_001)[1:]}"/>', PictureTooLarge, "of 20001 points"),
+        (f'<path d="{zigzag(15_000)}"/>' * 2, PictureTooLarge, "of 21213 points"),
+        (f'<path id="a" d="{zigzag(1000)}"/>' + '<use href="#a"/>' * 400, PictureTooLarge, "of 20024 points"),
+        (f"<{'x' * 9999}/>" + "".join(f"<x{number}/>" for number in range(999)), EmptyPicture, "<x18> is left out"),
         (nested(8), PictureTooLarge, "more than 20000 elements"),
         (nested(8).replace(DOT, ""), PictureTooLarge, "more than 20000 elements"),
         ("<g opacity='.5'>" * 500 + DOT + "</g>" * 500, PictureTooLarge, "inside one another"),
@@ -176,6 +185,20 @@ def test_refusals(body: str, error: type[PictureError], says: str) -> None:
     with pytest.raises(error, match=says) as caught:
         drawn(body)
     assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f'<path d="{zigzag(20_000)}"/>',
+        f'<path d="{zigzag(5000)}"/>' * 9,
+        f'<path d="{zigzag(100)}"/>' * 1000,
+        f'<g id="b"><path id="a" d="{zigzag(20_000)}"/></g>',
+    ],
+)
+def test_as_many_points_as_are_drawn_in_time(body: str) -> None:
+    assert alpha(drawn(body)).any()
 
 
 def test_entities_that_grow_without_end_are_refused() -> None:
