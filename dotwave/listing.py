@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from chainsim import Device, device_names, load_device
@@ -86,9 +87,12 @@ def list_translation_tables(wanted: str | None) -> TableListing:
     from encoders import list_tables
 
     key = (wanted or "").casefold()
-    found = [t for t in list_tables() if key in f"{t.file} {t.language} {t.name}".casefold()]
+    shown = {table: f"{table.file} {table.language} {table.name}".casefold() for table in list_tables()}
+    found = [table for table, words in shown.items() if key in words]
     if not found:
-        raise AppError(f"no table has {wanted!r} in its file, language or name; `dotwave tables` lists all")
+        close = get_close_matches(key, {word for words in shown.values() for word in words.split()}, n=1)
+        meant = f"did you mean {close[0]}?" if close else "`dotwave tables` lists all"
+        raise AppError(f"no table has {wanted!r} in its file, language or name; {meant}")
     return TableListing(tuple(found))
 
 

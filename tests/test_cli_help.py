@@ -117,6 +117,16 @@ def test_a_device_that_was_probably_meant_is_named(dotwave, name: str, meant: st
     assert "did you mean" not in dotwave("devices", "quite another").err
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"), [("germna", "german"), ("en-ueb-g3.ctb", "en-ueb-g"), ("frensh", "french")]
+)
+def test_a_table_that_was_probably_meant_is_named(dotwave, words: str, meant: str) -> None:
+    ended = dotwave("tables", words)
+    assert ended.code == 2
+    assert f"; did you mean {meant}" in ended.err
+    assert "`dotwave tables` lists all" in dotwave("tables", "no such language").err
+
+
 def test_simulate_takes_the_option_that_all_others_take(dotwave, tmp_path: Path) -> None:
     chain = tmp_path / "chain.yaml"
     chain.write_text(

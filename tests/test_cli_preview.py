@@ -155,8 +155,9 @@ def test_nothing_is_left_when_writing_fails(tmp_path: Path, monkeypatch: pytest.
 def test_no_frames_and_no_folder_are_bad_input(tmp_path: Path) -> None:
     with pytest.raises(AppError, match="no frames"):
         write_preview(report(), tmp_path / "x")
-    with pytest.raises((AppError, DriverError), match="missing"):
-        write_preview(report(frame()), tmp_path / "missing" / "x")
+    (tmp_path / "file").touch()
+    with pytest.raises((AppError, DriverError), match="file is not a folder"):
+        write_preview(report(frame()), tmp_path / "file" / "x")
 
 
 def test_the_text_says_what_the_picture_shows() -> None:
