@@ -82,7 +82,7 @@ def emulate(
     record: Annotated[Path | None, typer.Option("--record", "-o", help="A .wav for what arrives.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long; default: Ctrl-C.")] = None,
     once: Annotated[bool, typer.Option("--once", help="Stop when the first session has ended.")] = False,
-    buffer: Annotated[float, typer.Option(help="Seconds the controller can store.")] = 0.5,
+    buffer: Annotated[float, typer.Option(help="Seconds the controller can store.")] = 2.0,
     watchdog: Annotated[float, typer.Option(help="Seconds of silence after which the output is zero.")] = 0.2,
     drift: Annotated[float, typer.Option(help="Error of its clock in parts per million.")] = 0.0,
     drop: Annotated[float, typer.Option(min=0, max=1, help="Share of packets lost.")] = 0.0,

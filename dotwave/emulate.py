@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import load_device
-from drivers import ControllerSpec, Emulator, EmulatorStatus, Faults, Window
+from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, Window
 
 from .errors import AppError
 from .plain import printable
@@ -72,7 +72,7 @@ def emulate(
     record: Path | None = None,
     seconds: float | None = None,
     once: bool = False,
-    buffer_s: float = 0.5,
+    buffer_s: float = BUFFER_S,
     watchdog_s: float = 0.2,
     drift_ppm: float = 0.0,
     faults: Faults | None = None,

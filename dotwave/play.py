@@ -11,6 +11,7 @@ from typing import Any
 
 from drivers import (
     BOARD_BAUD,
+    BUFFER_S,
     BoardPlan,
     Firmware,
     GateLimits,
@@ -36,7 +37,7 @@ from drivers import (
 from .errors import AppError
 from .progress import progress
 
-__all__ = ["PlayReport", "PortsReport", "list_ports", "play"]
+__all__ = ["PlayReport", "PortsReport", "buffer_notes", "list_ports", "play"]
 
 SINKS = "give one of --port, --audio"
 
@@ -219,7 +220,22 @@ def _to_controller(
 
     run_session(session, open_line, patience_s=patience_s, progress=told)
     note = f"Samples went out in 16 bits: off by at most {1e3 * manifest.device.amplifier.volts / 65534:.2f} mV."
-    return replace(report, sink="controller", stream=session.report, notes=(note,))
+    return replace(report, sink="controller", stream=session.report, notes=(note, *buffer_notes(session.report)))
+
+
+def buffer_notes(stream: StreamReport) -> tuple[str, ...]:
+    """What to do about a buffer that ran dry, or would on a busy machine."""
+    if stream.underruns:
+        return (
+            f"The buffer ran dry: it holds {stream.buffer_s:.2f} s, and for up to {stream.longest_pause_s:.2f} s "
+            f"nothing could be sent. Close other programs, or give the controller room for more.",
+        )
+    if stream.buffer_s < BUFFER_S:
+        return (
+            f"The controller holds {stream.buffer_s:.2f} s: enough while this machine has little else to do, but "
+            f"when it is busy {BUFFER_S:g} s are needed.",
+        )
+    return ()
 
 
 def _to_board(

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .messages import Ack, Capabilities
     from .outgoing import UnfitController, session_messages
     from .packet import Kind, Packet, PacketReader
-    from .playout import ControllerSpec
+    from .playout import BUFFER_S, ControllerSpec
     from .pty_line import PtyUnavailable
     from .record import ArrivalRecorder
     from .serial_play import NoAnswer, run_session
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BOARD_BAUD",
+    "BUFFER_S",
     "EXCHANGE_SUFFIXES",
     "SUFFIXES",
     "Ack",
@@ -130,6 +131,7 @@ _LATE = {
     "AudioError": "audio",
     "AudioUnavailable": "audio",
     "BOARD_BAUD": "board_serial",
+    "BUFFER_S": "playout",
     "BoardEmulator": "board_serial",
     "BoardPlan": "tactile_board",
     "BoardRefusal": "drv2667",

@@ -17,12 +17,14 @@ from .early import MOST_EARLY
 from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Marked, State, Tones
 from .synthesis import Glide, ToneMix
 
-__all__ = ["ControllerSpec", "Event", "OutputBlock", "Playout"]
+__all__ = ["BUFFER_S", "ControllerSpec", "Event", "OutputBlock", "Playout"]
 
 Floats = NDArray[np.float64]
 Event = LinkCoupling | Bias | Tones | Mark
 
 BLOCK = 256
+BUFFER_S = 2.0  # what a host on a busy machine needs; see PROTOCOL.md
+EVENTS_PER_S = 2048  # links of linked-6x6 that change from frame to frame: 600 in a quarter of a second
 
 
 @dataclass(frozen=True)
@@ -52,13 +54,20 @@ class ControllerSpec:
 
     @classmethod
     def of(
-        cls, device: Device, *, buffer_s: float, watchdog_s: float = 0.2, ramp_s: float = 0.05, drift_ppm: float = 0.0
+        cls,
+        device: Device,
+        *,
+        buffer_s: float = BUFFER_S,
+        watchdog_s: float = 0.2,
+        ramp_s: float = 0.05,
+        drift_ppm: float = 0.0,
     ) -> ControllerSpec:
-        """A controller for `device` with room for `buffer_s` seconds."""
+        """A controller for `device` with room for `buffer_s` seconds of samples and of events."""
         rate, lam = device.amplifier.rate_hz, device.coupling.lam.max
+        slots = min(65535, max(256, math.ceil(buffer_s * EVENTS_PER_S)))
         return cls(
             rows=device.rows, cols=device.cols, channels=len(channels_of(device)), rate_hz=rate,
-            buffer_samples=max(2, math.ceil(buffer_s * rate)), event_slots=256,
+            buffer_samples=max(2, math.ceil(buffer_s * rate)), event_slots=slots,
             full_volts=device.amplifier.volts, lam_step=lam / 65535, lam_max=lam,
             watchdog_s=watchdog_s, ramp_s=min(ramp_s, watchdog_s), drift_ppm=drift_ppm,
         )  # fmt: skip

@@ -94,10 +94,11 @@ def _converse(
     clock: Callable[[], float],
 ) -> float:  # fmt: skip
     """Exchange bytes until the session ends or the line breaks; returns when the controller was last heard."""
-    opened_at = clock()
+    opened_at, out = clock(), b""
     try:
         while not session.finished:
-            data = line.read(POLL_S)
+            # No wait while there may be more to send: a busy machine does not let this process run again soon.
+            data = line.read(0.0 if out else POLL_S)
             now = clock()
             if session.receive(data, now):
                 heard_at = now

@@ -42,7 +42,7 @@ class Timing:
     Attributes
     ----------
     heartbeat_s : it is never silent for longer. resend_s : without progress it sends again after this.
-    hello_s : and greets again after this. window : packets under way. burst_bytes : sent at a time.
+    hello_s : and greets again after this. window : packets under way, at most 32. burst_bytes : sent at a time.
     """
 
     heartbeat_s: float = 0.025
@@ -64,6 +64,8 @@ class StreamReport:
     late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first.
     reported_late_s : the same by the host's clock when the report came, so the line's delay is in it.
     least_buffer_s : smallest store in the controller between its first sample and the last one sent.
+    buffer_s : what the controller has room for. longest_pause_s : longest time in which the host sent nothing, because
+        its machine was busy with other things or the line took nothing.
     """
 
     samples: int = 0
@@ -77,6 +79,8 @@ class StreamReport:
     late_s: dict[int, float] = field(default_factory=dict)
     reported_late_s: dict[int, float] = field(default_factory=dict)
     least_buffer_s: float = math.inf
+    buffer_s: float = 0.0
+    longest_pause_s: float = 0.0
 
 
 class _Phase(Enum):
@@ -108,6 +112,7 @@ class HostSession:
         self._events = 0
         self._ack: Ack | None = None
         self._hello_at = self._sent_at = -math.inf
+        self._polled_at = math.inf
         self._first_mark: tuple[float, Marked] | None = None
         self.capabilities: Capabilities | None = None
         self.report = StreamReport()
@@ -131,6 +136,7 @@ class HostSession:
         self._phase = _Phase.GREETING
         self._reader = PacketReader()
         self._hello_at = -math.inf
+        self._polled_at = math.inf
 
     def receive(self, data: bytes, now: float) -> int:
         """Take bytes that came at `now`; returns how many packets were in them.
@@ -167,6 +173,8 @@ class HostSession:
             self._hello_at = now
             # The zero ends whatever the line had of a packet before.
             return DELIMITER + HELLO
+        self.report.longest_pause_s = max(self.report.longest_pause_s, now - self._polled_at)
+        self._polled_at = now
         out = bytearray()
         while len(out) < self._timing.burst_bytes:
             wire = self._window.take(now)
@@ -210,6 +218,7 @@ class HostSession:
         if self._messages is None:
             self._messages = self._make(found)
             self.capabilities = found
+            self.report.buffer_s = found.buffer_samples / found.rate_hz
         elif begun and found.session != self._session:
             raise SessionLost(
                 f"controller {found.name!r} came back without the session, at {self.played_s:.3f} s; play again"

@@ -255,6 +255,8 @@ def test_a_starved_buffer_is_an_underrun_and_is_counted() -> None:
     bench.run(5.0)
     assert bench.session.report.underruns == 1
     assert bench.session.report.lost_s > 0.2
+    assert bench.session.report.longest_pause_s == pytest.approx(601 * STEP_S)
+    assert bench.session.report.buffer_s == SPEC.buffer_samples / SPEC.rate_hz
     np.testing.assert_array_equal(np.concatenate(bench.kept.blocks), codes)
 
 
