@@ -9,19 +9,21 @@ __all__ = ["draw"]
 
 WIDE, ROW, LEFT = 720, 22, 190
 COLOURS = ("#266694", "#c2571a")
+BARS = {
+    "transients": "Transients, times slower at equal error, per core, each peer at its best",
+    "steady": "Steady state, times slower, per core: integrators by shooting, AUTO and pyHarm a point",
+    "from_rest": "Steady state by 1300 periods from rest (extrapolated), times slower",
+}
 
 
 def draw(found: dict[str, Any]) -> str:
     """SVG text of a result of `harness.measure`."""
-    lines, top = _bars("Transients, times slower at equal error, per core", "transient_ratio", found["peers"], 20)
-    more, top = _bars(
-        "Steady state, times slower, per core (integrators: 1300 periods from rest, extrapolated)",
-        "steady_ratio",
-        found["peers"],
-        top + 20,
-    )
+    lines, top = [], 0
+    for kind, title in BARS.items():
+        more, top = _bars(title, kind, found["peers"], top + 20)
+        lines += more
     points, top = _lengths(found["lengths"], top + 20)
-    body = "\n".join([*lines, *more, *points])
+    body = "\n".join([*lines, *points])
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDE}" height="{top + 10}" font-family="sans-serif" '
         f'font-size="12"><rect width="100%" height="100%" fill="white"/>\n{body}\n</svg>\n'
@@ -34,13 +36,14 @@ def _text(x: float, y: float, words: str, weight: str = "normal") -> str:
 
 def _bars(title: str, key: str, peers: dict[str, Any], top: int) -> tuple[list[str], int]:
     lines, y = [_text(10, top, title, "bold")], top + 10
-    largest = max([each[key] for each in peers.values() if key in each], default=10.0)
+    ratios = {name: each[key]["ratio"] for name, each in peers.items() if key in each}
+    largest = max(ratios.values(), default=10.0)
     for name, each in peers.items():
         lines.append(_text(10, y + 14, name))
-        if key in each:
-            length = max(2.0, 380 * math.log10(max(each[key], 1.0)) / math.log10(max(largest, 10.0)))
+        if name in ratios:
+            length = max(2.0, 380 * math.log10(max(ratios[name], 1.0)) / math.log10(max(largest, 10.0)))
             lines.append(f'<rect x="{LEFT}" y="{y + 3}" width="{length:.1f}" height="14" fill="#266694"/>')
-            lines.append(_text(LEFT + length + 6, y + 14, f"{each[key]:,.3g}"))
+            lines.append(_text(LEFT + length + 6, y + 14, f"{ratios[name]:,.3g}"))
         else:
             lines.append(_text(LEFT, y + 14, each.get("missing", "does not apply")))
         y += ROW

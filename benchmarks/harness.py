@@ -14,20 +14,26 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from chart import draw  # noqa: E402
-from goals import ERROR, goals  # noqa: E402
+from continuation import CONTINUATIONS  # noqa: E402
+from goals import ERROR, STEADY_ERROR, goals, rate  # noqa: E402
+from integrators import INTEGRATORS, Missing, Way  # noqa: E402
 from ours import lengths, map_of_settings, one_alone, states_after, steady, transients  # noqa: E402
-from peers import PEERS, Missing  # noqa: E402
 from problem import PERIODS, SETTLED  # noqa: E402
+from shooting import CHAINS, steady_by_shooting, transients_by  # noqa: E402
 
 __all__ = ["measure"]
 
 CORES = os.cpu_count() or 1
+# The quickest ways of transients are those that shooting is tried with.
+SHOOTING_WAYS = 2
+# Periods from rest until nothing but rounding is left of the way in.
+STILL = 20_000
 
 
 def measure(quick: bool) -> dict[str, Any]:
     """Everything, as plain values; `quick` takes fewer settings."""
     found: dict[str, Any] = {
-        "schema": "dotwave/bench/2",
+        "schema": "dotwave/bench/3",
         "quick": quick,
         "machine": {"processor": _processor(), "cores": CORES, "python": platform.python_version()},
         "load_before": os.getloadavg()[0],
@@ -44,32 +50,35 @@ def measure(quick: bool) -> dict[str, Any]:
 
 
 def _peers(found: dict[str, Any]) -> dict[str, Any]:
-    """Every peer at an error of `ERROR`, with ratios to ours on as many cores: theirs on one, ours per core."""
-    wanted = states_after(64, 64)
-    best = max(
-        (each for each in found["transients"] if each["median_error"] <= ERROR),
-        key=lambda each: each["chain_periods_per_s"],
-    )
-    ours_period = best["cpu_s"] / (best["chain_periods_per_s"] * best["wall_s"])
+    """Every peer at its best settings, with ratios to ours on as many cores: theirs on one, ours per core."""
+    fast = max((each for each in found["transients"] if each["median_error"] <= ERROR), key=lambda each: rate(each))
+    ours_period = fast["cpu_s"] / (rate(fast) * fast["wall_s"])
     ours_steady = found["steady"]["cpu_s"] / found["steady"]["settings"]
     told: dict[str, Any] = {}
-    for name, peer in PEERS.items():
+    for name, ways in INTEGRATORS.items():
         try:
-            told[name] = peer(wanted, ERROR)
+            told[name] = _integrated(list(ways()), ours_period, ours_steady)
         except Missing as reason:
             told[name] = {"missing": str(reason)}
-            continue
-        if "s_per_point_one_core" in told[name]:
-            told[name] |= {"steady_ratio": told[name]["s_per_point_one_core"] / ours_steady, "extrapolated": False}
-            continue
-        seconds = told[name]["s_per_chain_one_core"] / PERIODS
-        # From rest the steady state takes SETTLED periods; the time for them is scaled up from PERIODS.
-        told[name] |= {
-            "transient_ratio": seconds / ours_period,
-            "steady_ratio": seconds * SETTLED / ours_steady,
-            "extrapolated": True,
-        }
+    for name, follow in CONTINUATIONS.items():
+        try:
+            point = follow(STEADY_ERROR)
+            told[name] = {"steady": point | {"way": "a point of a branch", "ratio": point["s_per_chain"] / ours_steady}}
+        except Missing as reason:
+            told[name] = {"missing": str(reason)}
     return told
+
+
+def _integrated(ways: list[Way], ours_period: float, ours_steady: float) -> dict[str, Any]:
+    """Transients, steady states by shooting, and what these would take from rest."""
+    motion = transients_by(ways, states_after(CHAINS, 64), ERROR)
+    motion["ratio"] = motion["s_per_chain"] / PERIODS / ours_period
+    quick = sorted(ways, key=lambda way: motion["tried"][way.settings])[:SHOOTING_WAYS]
+    still = steady_by_shooting(quick, states_after(CHAINS, 64, STILL), STEADY_ERROR)
+    still |= {"way": "shooting", "ratio": still["s_per_chain"] / ours_steady}
+    waited = {"periods": SETTLED, "extrapolated": True}
+    waited["ratio"] = motion["s_per_chain"] / PERIODS * SETTLED / ours_steady
+    return {"transients": motion, "steady": still, "from_rest": waited}
 
 
 def _processor() -> str:

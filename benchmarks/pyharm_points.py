@@ -1,19 +1,21 @@
 """pyHarm-os along a branch, run by its own interpreter: ``python pyharm_points.py`` with the question as JSON on stdin.
 
-Reads n, delta, epsilon, lam, omega (from, to), harmonics, points and solver; writes seconds of the processor per point
-and the last point's omega and amplitudes of the first harmonic.
+Reads n, delta, epsilon, lam, omega (from, to), points, step and a list of ways (harmonics, samples, solver and its
+options, predictor, corrector); writes its version, and for each way seconds of the processor per point, whether all
+were accepted, and the last point's omega and amplitudes of the first harmonic.
 """
 
 import json
 import logging
 import sys
 import time
+from importlib.metadata import version
 
 import numpy as np
 from pyHarm.Maestro import Maestro
 
 
-def chain(asked):
+def chain(asked, way):
     n, lam = asked["n"], asked["lam"]
     stiffness = np.eye(n) + lam * (np.diag([0.0] + [1.0] * (n - 1)) - np.eye(n, k=-1))
     matrices = {"M": np.eye(n), "C": asked["delta"] * np.eye(n), "K": stiffness}
@@ -21,23 +23,22 @@ def chain(asked):
     drive = {"type": "CosinusForcing", "connect": {"chain": [0]}, "dirs": [0], "amp": asked["epsilon"]}
     low, high = asked["omega"]
     return {
-        "system": {"type": "Base", "nh": asked["harmonics"], "nti": 16},
+        "system": {"type": "Base", "nh": way["harmonics"], "nti": way["samples"]},
         "substructures": {"chain": {"matrix": matrices, "ndofs": 1}},
         "connectors": {**cubic, "drive": drive},
         "analysis": {
             "branch": {
                 "study": "frf", "puls_inf": low, "puls_sup": high, "sign_ds": -1, "verbose": False,
-                "solver": asked["solver"], "predictor": "tangent", "corrector": "arc_length",
+                "solver": way["solver"], "solver_options": way["options"],
+                "predictor": way["predictor"], "corrector": way["corrector"],
                 "ds0": asked["step"], "ds_max": asked["step"], "ds_min": 1e-9,
             }
         },
     }  # fmt: skip
 
 
-def main():
-    asked = json.load(sys.stdin)
-    logging.disable(logging.CRITICAL)
-    maestro = Maestro(chain(asked))
+def measured(asked, way):
+    maestro = Maestro(chain(asked, way))
     study = maestro.nls["branch"]
     study.initialise("null")
     warm, points = 10, asked["points"]
@@ -51,10 +52,16 @@ def main():
     place = maestro.system.expl_dofs
     first = place[place["harm"] == 1]
     size = [float(np.hypot(*taken[-1].x[first[first["node_num"] == m].index])) for m in range(asked["n"])]
-    print(json.dumps({
+    return {
         "s_per_point": seconds, "accepted": bool(all(each.flag_accepted for each in taken)),
         "omega": float(taken[-1].x[-1]), "amplitude": size,
-    }))  # fmt: skip
+    }  # fmt: skip
+
+
+def main():
+    asked = json.load(sys.stdin)
+    logging.disable(logging.CRITICAL)
+    print(json.dumps([version("pyHarm-os"), [measured(asked, way) for way in asked["ways"]]]))
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ class BenchReport:
         return self.found
 
     def as_text(self) -> str:
-        """Our own figures, then a line for each peer."""
+        """Our own figures, then for each peer its ratios with the settings they were measured at, then the goals."""
         found = self.found
         steady = found["steady"]
         lines = [
@@ -49,7 +49,7 @@ class BenchReport:
         ]
         lines.append(f"map of {found['map']['settings']} settings to NPZ and PNG: {found['map']['wall_s']:.2f} s")
         for name, peer in found["peers"].items():
-            lines.append(f"{name}: {_said(peer)}")
+            lines += _said(name, peer)
         lines += [_goal(each) for each in found["goals"]]
         return "\n".join([*lines, f"written: {self.folder / 'bench.json'}, {self.folder / 'bench.svg'}"])
 
@@ -57,21 +57,29 @@ class BenchReport:
 def _goal(each: dict[str, Any]) -> str:
     unit = f" {each['unit']}" if each["unit"] else ""
     asked = f"at {each['sense']} {each['goal']:g}{unit}"
+    note = f" ({each['note']})" if each["note"] else ""
     if each["reached"] is None:
-        return f"goal, {each['what']}: {asked}; not measured"
+        return f"goal, {each['what']}: {asked}; not measured{note}"
     verdict = "reached" if each["reached"] else "NOT reached"
-    return f"goal, {each['what']}: {asked}; {each['measured']:.3g}{unit}, {verdict}"
+    return f"goal, {each['what']}: {asked}; {each['measured']:.3g}{unit}, {verdict}{note}"
 
 
-def _said(peer: dict[str, Any]) -> str:
+def _said(name: str, peer: dict[str, Any]) -> list[str]:
     if "missing" in peer:
-        return f"missing: {peer['missing']}"
-    told = []
-    if "transient_ratio" in peer:
-        reached = "" if peer["reached"] else " (does not reach our error)"
-        told.append(f"{peer['transient_ratio']:.3g} times slower in transients{reached}")
-    extrapolated = " (extrapolated)" if peer["extrapolated"] else ""
-    return ", ".join([*told, f"{peer['steady_ratio']:.3g} times to a steady state{extrapolated}"])
+        return [f"{name}: missing: {peer['missing']}"]
+    told, steady = [], peer["steady"]
+    if "transients" in peer:
+        motion = peer["transients"]
+        told.append(f"{name}: {_ratio(motion)} times slower in transients [{motion['settings']}]")
+    told.append(f"{name}: {_ratio(steady)} times to a steady state, {steady['way']} [{steady['settings']}]")
+    if "from_rest" in peer:
+        rest = peer["from_rest"]
+        told.append(f"{name}: {rest['ratio']:.3g} times by {rest['periods']} periods from rest (extrapolated)")
+    return told
+
+
+def _ratio(found: dict[str, Any]) -> str:
+    return f"{found['ratio']:.3g}" + ("" if found["reached"] else " (does not reach our error)")
 
 
 def run_bench(folder: Path, *, quick: bool) -> BenchReport:

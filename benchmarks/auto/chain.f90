@@ -20,6 +20,26 @@ SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)
   SQ = U(13)**2 + U(14)**2
   F(13) = U(13) - PAR(3)*U(14) - U(13)*SQ
   F(14) = PAR(3)*U(13) + U(14) - U(14)*SQ
+  IF (IJAC == 0) RETURN
+  DFDU = 0D0
+  DO M = 1, 6
+    DFDU(M,6+M) = 1D0
+    DFDU(6+M,6+M) = -PAR(4)
+    DFDU(6+M,M) = 3D0*U(M)**2 - 1D0
+    IF (M == 1) THEN
+      DFDU(6+M,13) = PAR(1)
+    ELSE
+      DFDU(6+M,M) = DFDU(6+M,M) - PAR(2)
+      DFDU(6+M,M-1) = PAR(2)
+    END IF
+  END DO
+  DFDU(13,13) = 1D0 - SQ - 2D0*U(13)**2
+  DFDU(13,14) = -PAR(3) - 2D0*U(13)*U(14)
+  DFDU(14,13) = PAR(3) - 2D0*U(13)*U(14)
+  DFDU(14,14) = 1D0 - SQ - 2D0*U(14)**2
+  IF (IJAC == 1) RETURN
+  DFDP(:,1) = 0D0
+  DFDP(7,1) = U(13)
 END SUBROUTINE FUNC
 
 SUBROUTINE STPNT(NDIM,U,PAR,T)
