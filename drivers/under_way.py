@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 __all__ = ["UnderWay"]
 
+MOST_PATIENT = 4  # times resend_s
+
 
 @dataclass
 class _Sent:
@@ -17,7 +19,8 @@ class _Sent:
     wire: bytes
     samples: int
     turn: int | None = None
-    before: bool = False  # whether it was sent at all
+    at: float = 0.0
+    sendings: int = 0
     here: bool = False  # whether the controller keeps it for its turn
 
 
@@ -29,7 +32,8 @@ class UnderWay:
 
     Parameters
     ----------
-    most : packets. resend_s : without progress all that is missing is sent again after this.
+    most : packets. resend_s : without progress all that is missing is sent again after this, or after two round trips
+        where these take longer.
 
     Attributes
     ----------
@@ -38,7 +42,7 @@ class UnderWay:
 
     def __init__(self, most: int, resend_s: float) -> None:
         self._most = most
-        self._resend_s = resend_s
+        self._resend_s = self._patience_s = resend_s
         self._window: deque[_Sent] = deque()
         self._turns = 0
         self._moved_at = -math.inf
@@ -59,13 +63,15 @@ class UnderWay:
 
     def take(self, now: float) -> bytes | None:
         """The bytes of a packet that has to be sent, which count as sent at `now`; None when there is none."""
-        if self._window and now - self._moved_at > self._resend_s:
+        if self._window and self._window[0].sendings and now - self._moved_at > self._patience_s:
+            # Until a packet that was sent once tells the round trip, it may be longer than was thought.
+            self._be_patient(2 * self._patience_s)
             self.again(now)
         for place, sent in enumerate(self._window):
             if sent.turn is None and not sent.here:
-                self.resent += sent.before
+                self.resent += sent.sendings > 0
                 self._turns += 1
-                sent.turn, sent.before = self._turns, True
+                sent.turn, sent.at, sent.sendings = self._turns, now, sent.sendings + 1
                 if place == 0:
                     self._moved_at = now
                 return sent.wire
@@ -90,6 +96,8 @@ class UnderWay:
             sent = self._window.popleft()
             latest = max(latest, sent.turn or 0)
             self._moved_at = now
+            if sent.sendings == 1:
+                self._be_patient(2 * (now - sent.at))
             self.packets += 1
             self.samples += sent.samples
         for sent in self._window:
@@ -100,3 +108,6 @@ class UnderWay:
         for sent in self._window:
             if sent.turn is not None and sent.turn < latest and not sent.here:
                 sent.turn = None
+
+    def _be_patient(self, seconds: float) -> None:
+        self._patience_s = min(max(seconds, self._resend_s), MOST_PATIENT * self._resend_s)

@@ -148,11 +148,21 @@ def test_a_lost_packet_is_sent_again_once_in_a_round_trip() -> None:
     assert sent(1.04) == bytes([2])
     window.arrived(9, 0, 1.05)
     assert (len(window), window.packets, window.resent) == (0, 9, 2)
-    # With nothing after it, only time tells.
+    # With nothing after it, only time tells; packets that were sent once took 50 ms, so 100 ms it is.
     window.add(9, bytes([9]), 0)
     assert sent(2.0) == bytes([9])
     assert sent(2.09) == b""
     assert sent(2.11) == bytes([9])
+
+
+def test_a_long_line_is_not_taken_for_a_broken_one() -> None:
+    codes = codes_of(3.0, 1)
+    bench = Bench(codes, [], Faults(delay_s=0.075))
+    bench.run(10.0)
+    np.testing.assert_array_equal(bench.kept.codes, codes)
+    # Only the first packet is sent before anything is known about the line.
+    assert bench.session.report.resent <= 2
+    assert bench.session.report.underruns == 0
 
 
 def greeted(version: int, **options: int) -> VirtualController:
