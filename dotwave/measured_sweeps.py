@@ -25,6 +25,10 @@ __all__ = ["COLUMNS", "ChainPlace", "read_sweeps"]
 # Columns a table must have, in any order; others are passed over.
 COLUMNS = ("row", "col", "frequency_hz", "drive_v", "amplitude", "phase_rad")
 MAX_BYTES = 64_000_000
+# Short lines make many of few bytes; each takes 0.2 kB of memory.
+MOST_POINTS = 2_000_000
+# Of anything that was measured, in its unit here; squares of it are still numbers.
+HIGHEST = 1e12
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,9 @@ def read_sweeps(source: str, device: Device) -> dict[ChainPlace, Sweep]:
         When the file cannot be read or does not fit; with the line and the column.
     """
     points: dict[tuple[int, int], list[_Point]] = {}
-    for actuator, point in _points(source, device):
+    for number, (actuator, point) in enumerate(_points(source, device)):
+        if number == MOST_POINTS:
+            raise AppError(f"{source}: more than {MOST_POINTS} points; sweep fewer, or a row at a time")
         points.setdefault(actuator, []).append(point)
     if not points:
         raise AppError(f"{source}: no line with numbers below the header; nothing to fit")
@@ -139,6 +145,8 @@ def _number(place: str, column: str, word: str, lowest: float = -math.inf) -> fl
     if not (math.isfinite(value) and value >= lowest):
         wanted = "a number" if lowest == -math.inf else f"a number >= {lowest:g}"
         raise AppError(f"{place}: column {column}: expected {wanted}, got {word[:40]!r}")
+    if abs(value) > HIGHEST:
+        raise AppError(f"{place}: column {column}: {value:g} is nothing that was measured; check its unit")
     return value
 
 

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from chainsim import Device, Outcome, complaint_of, shown
+from chainsim import Device, Outcome, complaint_of, shown, words_of
 
 from .channels import Channel, Role
 from .coupling import CouplingEvent
 from .errors import UnreadableWaveform
 from .files import naming
 from .manifest import FrameMark, Manifest
+from .samples import SUFFIXES
 
 __all__ = ["read_manifest"]
 
@@ -27,6 +28,8 @@ MOST_SAMPLES = 1 << 60
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# A length to hold to also makes sure that it is text which can be written: JSON can name half a character.
+Words = Annotated[str, Field(max_length=1_000_000)]
 Index = Annotated[int, Field(ge=0)]
 
 
@@ -55,8 +58,8 @@ class _Frame(_Part):
     end_s: Seconds
     omega: list[Positive]
     target: list[list[Finite]]
-    cells: str = ""
-    text: str = ""
+    cells: Words = ""
+    text: Words = ""
     outcome: Annotated[Outcome, Field(strict=False)]
     page: Index = 0
     span: Annotated[list[Index], Field(min_length=2, max_length=2)] = [0, 0]
@@ -67,7 +70,7 @@ class _Frame(_Part):
 
 class _File(_Part):
     schema_: Literal["dotwave/waveform/1"] = Field(alias="schema")
-    samples_file: Annotated[str, Field(min_length=1)]
+    samples_file: Annotated[Words, Field(min_length=1)]
     rate_hz: Annotated[int, Field(ge=1, le=MOST_HZ)]
     samples: Annotated[int, Field(ge=0, le=MOST_SAMPLES)]
     digest: Annotated[str, Field(pattern="^sha256:[0-9a-f]{64}$")]
@@ -111,7 +114,8 @@ def _no_constant(name: str) -> NoReturn:
 
 
 def _place(parts: tuple[str | int, ...]) -> str:
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".") or "file"
+    words = (f"[{part}]" if isinstance(part, int) else f".{words_of((part,))}" for part in parts)
+    return "".join(words).removeprefix(".") or "file"
 
 
 class _Check:
@@ -124,6 +128,9 @@ class _Check:
     def all(self, file: _File) -> None:
         if Path(file.samples_file).name != file.samples_file or "\0" in file.samples_file:
             self._refuse("samples_file", f"expected a name without folders, got {shown(file.samples_file)}")
+        if Path(file.samples_file).suffix.lower() not in SUFFIXES:
+            wanted = f"a name that ends in {', '.join(SUFFIXES)}"
+            self._refuse("samples_file", f"expected {wanted}, got {shown(file.samples_file)}")
         self._channels(file.channels)
         last = [0.0] * self._device.rows
         for index, event in enumerate(file.coupling):

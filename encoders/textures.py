@@ -36,7 +36,8 @@ def plane_wave(shape: GridShape, *, lag_deg: float, row_lag_deg: float = 0.0, le
     if not (math.isfinite(lag_deg) and math.isfinite(row_lag_deg)):
         raise TextureError(f"wave: expected finite lags, got {lag_deg} and {row_lag_deg}")
     row, col = np.ogrid[: shape.rows, : shape.cols]
-    phase = -np.deg2rad(lag_deg * col + row_lag_deg * row)
+    # Turns are left out first: however large a lag is, its multiples are numbers.
+    phase = -np.deg2rad(math.fmod(lag_deg, 360.0) * col + math.fmod(row_lag_deg, 360.0) * row)
     return _target(_level(level) * np.exp(1j * phase), PatternKind.SINE, phase_matters=True)
 
 
@@ -52,9 +53,8 @@ def bars(
     """
     if width < 1 or gap < 1:
         raise TextureError(f"bars: expected width and gap of 1 or more actuators, got {width} and {gap}")
-    place = np.arange(shape.cols if vertical else shape.rows)
-    raised = (place - first) % (width + gap) < width
-    line = np.where(raised, _level(level), 0.0)
+    places = range(shape.cols if vertical else shape.rows)
+    line = np.where([(place - first) % (width + gap) < width for place in places], _level(level), 0.0)
     grid = np.broadcast_to(line if vertical else line[:, None], (shape.rows, shape.cols))
     return _target(grid, PatternKind.BARS)
 
@@ -96,7 +96,10 @@ def levels(amplitude: ArrayLike) -> TargetPattern:
     TextureError
         When it is not a table of such numbers.
     """
-    grid = np.asarray(amplitude, dtype=np.float64)
+    try:
+        grid = np.asarray(amplitude, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TextureError("levels: expected rows of as many numbers each") from None
     if grid.ndim != 2 or not grid.size:
         raise TextureError(f"levels: expected rows of numbers, got shape {grid.shape}")
     if not np.all((grid >= 0) & (grid <= 1)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -79,6 +80,15 @@ def test_csv_as_people_write_it(tmp_path: Path) -> None:
     found = read_table(path)
     assert found["epsilon"].tolist() == [1e-3, 0.5]
     assert found["lam"].tolist() == [[5, 4], [7, 6]]
+
+
+def test_a_wide_row_takes_no_memory_for_those_that_may_follow(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("epsilon,lam,omega\n" + ",".join(["1"] * 100_000) + "\n")
+    tracemalloc.start()
+    assert refused(path) == ":2: expected 3 numbers, got 100000"
+    assert tracemalloc.get_traced_memory()[1] < 50_000_000
+    tracemalloc.stop()
 
 
 def test_csv_of_too_many_numbers_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

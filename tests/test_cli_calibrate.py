@@ -153,6 +153,8 @@ def test_columns_may_come_in_any_order_and_with_others(tmp_path: Path) -> None:
         (some(put(2, "phase_rad", "nan")), r"sweep\.csv:4: column phase_rad: expected a number, got 'nan'"),
         (some(put(0, "frequency_hz", "0")), r"sweep\.csv:2: column frequency_hz: expected a number > 0, got 0"),
         (some(put(0, "frequency_hz", "inf")), r"sweep\.csv:2: column frequency_hz: expected a number, got 'inf'"),
+        (some(put(2, "amplitude", "1e308")), r"sweep\.csv:4: column amplitude: 1e\+308 is nothing that was measured"),
+        (some(put(2, "phase_rad", "-1e99")), r"sweep\.csv:4: column phase_rad: -1e\+99 is nothing that was measured"),
         (some(put(1, "row", "6")), r"sweep\.csv:3: column row: expected a whole number 0\.\.5, got '6'"),
         (some(put(1, "col", "1.5")), r"sweep\.csv:3: column col: expected a whole number 0\.\.5, got '1\.5'"),
         (some(put(14, "drive_v", "0.3")), r"sweep\.csv:16: column drive_v: 0\.3 where line 4 of the chain's first"),
@@ -176,6 +178,15 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
         read_sweeps(str(tmp_path), DEVICE)
     (tmp_path / "sweep.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AppError, match="not UTF-8 at byte 0; save it as CSV in UTF-8"):
+        read_sweeps(str(tmp_path / "sweep.csv"), DEVICE)
+
+
+def test_more_points_than_memory_is_good_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sweep.csv").write_text(some(), encoding="utf-8")
+    monkeypatch.setattr("dotwave.measured_sweeps.MOST_POINTS", 24)
+    read_sweeps(str(tmp_path / "sweep.csv"), DEVICE)
+    monkeypatch.setattr("dotwave.measured_sweeps.MOST_POINTS", 23)
+    with pytest.raises(AppError, match=r"sweep\.csv: more than 23 points; sweep fewer, or a row at a time"):
         read_sweeps(str(tmp_path / "sweep.csv"), DEVICE)
 
 

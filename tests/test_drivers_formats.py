@@ -1,16 +1,21 @@
 """Every file format of samples: one body of tests for all, and what each loses."""
 
 import tracemalloc
+import zipfile
 
 import numpy as np
 import pytest
 
 from chainsim import load_device
 from drivers import SUFFIXES, FileError, UnreadableWaveform, Waveform, WaveformError, read_waveform, write_waveform
+from drivers.channels import Channel, Role
+from drivers.npz import NpzReader
+from drivers.raw import RawReader
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
 
 # What a value may be off by, relative to the volts of a full scale.
+ONE_CHANNEL = [Channel(0, Role.DRIVE, 0, None, 100.0)]
 LOSES = {".wav": 2.0**-24, ".npz": 0.0, ".csv": 0.5e-8, ".raw": 2.0**-24}
 
 
@@ -119,6 +124,59 @@ def test_a_csv_edited_by_hand_names_the_line(tmp_path):
         out.write_text("".join([*lines[:number], line, *lines[number + 1 :]]))
         with pytest.raises(UnreadableWaveform, match=says):
             list(read_waveform(out)[1].blocks(100))
+
+
+def archived(path, volts, rate, packed=zipfile.ZIP_STORED):
+    with zipfile.ZipFile(path, "w", packed) as archive:
+        archive.writestr("volts.npy", volts)
+        archive.writestr("rate_hz.npy", rate)
+    return path
+
+
+def npy(shape, data=b"", descr="<f8"):
+    header = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + data
+
+
+RATE = npy("()", (8000).to_bytes(8, "little"), "<i8")
+NOT_VOLTS = {
+    "shape_below_0": (npy("(-5, 1)"), RATE),
+    "nested_header": (npy("(" * 5000), RATE),
+    "records": (npy("(1, 1)", bytes(8), "V8"), RATE),
+    "rate_of_a_million_million": (npy("(1, 1)", bytes(8)), npy("(1000000000000,)", b"", "<i8")),
+    "rate_0": (npy("(1, 1)", bytes(8)), npy("()", bytes(8), "<i8")),
+    "rate_cut": (npy("(1, 1)", bytes(8)), npy("()", bytes(7), "<i8")),
+    "rate_of_text": (npy("(1, 1)", bytes(8)), npy("()", bytes(8), "<U2")),
+    "no_array": (b"words", RATE),
+}
+
+
+@pytest.mark.parametrize(("volts", "rate"), NOT_VOLTS.values(), ids=NOT_VOLTS)
+def test_an_npz_of_something_else_is_refused_by_its_headers(tmp_path, volts, rate):
+    with pytest.raises(UnreadableWaveform, match=r"x\.npz: "):
+        NpzReader.open(archived(tmp_path / "x.npz", volts, rate), ONE_CHANNEL, 8000)
+
+
+def test_a_damaged_npz_is_refused_where_it_is_read(tmp_path):
+    data = np.random.default_rng(0).normal(size=4000)
+    path = archived(tmp_path / "x.npz", npy("(4000, 1)", data.tobytes()), RATE, zipfile.ZIP_DEFLATED)
+    assert np.array_equal(np.concatenate(list(NpzReader.open(path, ONE_CHANNEL, 8000).blocks(300)))[:, 0], data)
+    raw = bytearray(path.read_bytes())
+    raw[2000:2200] = bytes(200)
+    path.write_bytes(raw)
+    with pytest.raises(UnreadableWaveform, match=r"x\.npz: "):
+        list(NpzReader.open(path, ONE_CHANNEL, 8000).blocks(300))
+    longer = archived(tmp_path / "x.npz", npy("(10000000000000, 1)", data.tobytes()), RATE)
+    with pytest.raises(UnreadableWaveform, match="ends early"):
+        list(NpzReader.open(longer, ONE_CHANNEL, 8000).blocks(300))
+
+
+def test_volts_beyond_all_numbers_are_refused(tmp_path):
+    """A stored 3e38 of 1e300 volts each."""
+    channels = [Channel(0, Role.DRIVE, 0, None, 1e300)]
+    (tmp_path / "x.raw").write_bytes(np.full(3, 3e38, dtype="<f4").tobytes())
+    with pytest.raises(UnreadableWaveform, match=r"x\.raw: channel 0 at 0 s is inf"):
+        list(RawReader.open(tmp_path / "x.raw", channels, 8000).blocks(3))
 
 
 @pytest.mark.slow

@@ -29,6 +29,13 @@ def test_bars_stand_upright_or_lie():
     np.testing.assert_array_equal(lying.amplitude[:, 3].real, [0, 0.5, 0, 0, 0.5, 0])
 
 
+def test_numbers_however_large_make_a_texture():
+    assert (bars(GRID, vertical=True, width=10**30, gap=1, first=-(10**40)).amplitude.imag == 0).all()
+    assert bars(GRID, vertical=True, width=10**30, gap=1).amplitude.all()
+    assert np.isfinite(plane_wave(GRID, lag_deg=1e308, row_lag_deg=-1e308).amplitude).all()
+    np.testing.assert_allclose(plane_wave(GRID, lag_deg=780).amplitude, plane_wave(GRID, lag_deg=60).amplitude)
+
+
 def test_walking_bars_fill_the_grid():
     walking = walking_bars(GRID, width=3)
     assert walking.walking.width == 3
@@ -64,6 +71,8 @@ def test_what_leaves_the_core_is_read_only():
         (lambda: levels([[0.5, 2.0]]), "2.0"),
         (lambda: levels([[float("nan")]]), "nan"),
         (lambda: levels([1.0, 2.0]), "rows"),
+        (lambda: levels([[0.5, 1.0], [0.5]]), "rows of as many numbers each"),
+        (lambda: levels([["high"]]), "rows of as many numbers each"),
         (lambda: regions(GRID, [Region(0, 7, 0, 1, levels(np.zeros((6, 8))))]), "region 0"),
         (lambda: regions(GRID, [Region(0, 2, 0, 2, walking_bars(GRID, width=3))]), "walking"),
         (lambda: regions(GRID, [Region(0, 2, 0, 2, levels(np.zeros((6, 8))))] * 2), "region 1: overlaps"),

@@ -62,6 +62,9 @@ WRONG = {
     ),
     "device: {full_scale: 5}\nsequence: [{pause_s: 1}]": "1: device: full_scale 5.0 is beyond the softening hilltop",
     "device: {chain_length: 4}\nsequence: [{pause_s: 1}]": "1: device: chain_length 4 does not divide cols 6",
+    "sequence: {text: a}": "1: sequence: expected a list, got {'text': 'a'}",
+    "sequence: [{texture: {levels: 3}}]": "1: sequence.0.texture.levels: expected a list, got 3",
+    "device: {spread: [1]}\nsequence: [{pause_s: 1}]": "1: device.spread: expected keys and values, got [1]",
     "device: {coupling: {scope: both}}\nsequence: [{pause_s: 1}]": "1: device.coupling.scope: expected",
 }
 
@@ -85,6 +88,20 @@ def test_complaints_name_the_place_and_the_cure(tmp_path: Path, text: str) -> No
         read_job(written(tmp_path, text))
     assert str(caught.value).startswith(f"{tmp_path}/job.yaml:{WRONG[text]}")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("device", "says"),
+    [
+        ("{name: ''}", "name: expected text of 1 characters or more, got ''"),
+        ("{delta: 2}", "delta: expected a number < 1.0, got 2.0"),
+        ("{spread: {frequency: 2}}", "spread.frequency: expected a number <= 1.0, got 2.0"),
+    ],
+)
+def test_what_its_base_makes_wrong_is_said_in_the_same_words(tmp_path: Path, device: str, says: str) -> None:
+    with pytest.raises(ProfileError) as caught:
+        read_job(written(tmp_path, f"device: {device}\nsequence: [{{pause_s: 1}}]"))
+    assert str(caught.value) == f"{tmp_path}/job.yaml:1: device: {says}"
 
 
 @pytest.mark.parametrize("rows", ["6.0", "true", "'6'", "1025", "null0"])
