@@ -206,8 +206,6 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.EACCES: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EPERM: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EROFS: f"folder {folder} is on a read-only file system; choose another folder",
-        errno.EEXIST: "a file of this name is in the way; give another name",
-        errno.ENAMETOOLONG: "the name is longer than the file system takes; shorten it",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
         errno.EEXIST: "there is a file of this name; choose another",
         errno.ENAMETOOLONG: "the name is too long; shorten it",

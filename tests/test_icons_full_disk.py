@@ -124,7 +124,7 @@ def test_outputs_that_take_nothing(dotwave: Callable[..., Any], folder: Path, tm
     ended = dotwave("icons", folder, "-o", "/dev/full")
     assert ended.code == 2
     assert ended.err.count("\n") == 1
-    assert "/dev/full: a file of this name is in the way" in ended.err
+    assert "/dev/full: there is a file of this name" in ended.err
     out = tmp_path / "out"
     out.mkdir()
     (out / "journal.jsonl").symlink_to("/dev/full")
