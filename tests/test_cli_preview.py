@@ -186,3 +186,21 @@ def test_the_text_is_made_for_listening() -> None:
     """No box drawing, no escape codes, no block characters: Braille and plain letters only."""
     said = "\n".join(spoken(report(frame(text="déjà vu"))))
     assert not re.search(r"[\u2500-\u25ff\x1b\t]", said)
+
+
+def test_the_files_of_a_preview_are_all_old_or_all_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_preview(report(frame()), tmp_path / "x")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dotwave.preview._spell", full)
+        with pytest.raises(DriverError, match=r"x\.txt: the disk is full"):
+            write_preview(report(frame(text="other")), tmp_path / "x")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    write_preview(report(frame(text="other")), tmp_path / "x")
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert after.keys() == before.keys()
+    assert all(after[name] != before[name] for name in before)

@@ -17,6 +17,7 @@ from dotwave.errors import AppError
 from dotwave.sweep_files import Parts
 from dotwave.sweep_io import FIELDS, run_sweep
 from dotwave.sweep_picture import draw_map
+from drivers import FileError
 
 TEXT = """\
 chain: {n: 3, delta: 6.0e-3, beta: -1.0}
@@ -275,3 +276,19 @@ def test_no_worker_outlives_a_sweep_that_is_killed(source, tmp_path):
     for one in alive:
         one.kill()
     assert not alive
+
+
+def test_a_map_is_there_whole_or_not_at_all(source, tmp_path, monkeypatch):
+    from PIL import Image
+
+    def full(self, file, **_):
+        file.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    run_sweep(source, tmp_path / "out.npz")
+    (tmp_path / "map.png").write_bytes(b"old")
+    monkeypatch.setattr(Image.Image, "save", full)
+    with pytest.raises(FileError, match=r"map\.png: the disk is full"):
+        draw_map(source, tmp_path / "out.npz", tmp_path / "map.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.png", "out.npz", "sweep.yaml"]
+    assert (tmp_path / "map.png").read_bytes() == b"old"
