@@ -25,7 +25,7 @@ __all__ = ["measure"]
 
 CORES = os.cpu_count() or 1
 # The quickest ways of transients are those that shooting is tried with.
-SHOOTING_WAYS = 2
+SHOOTING_WAYS = 3
 # Periods from rest until nothing but rounding is left of the way in.
 STILL = 20_000
 

@@ -101,7 +101,7 @@ def scipy() -> Iterator[Way]:
     """The compiled DOP853 behind scipy.integrate.ode, many chains as one system, a right side compiled by numba."""
     from scipy.integrate import ode
 
-    for lanes in (1, 16, 64):
+    for lanes in (64, 256):
 
         def make(tolerance: float, rows: int, lanes: int = lanes) -> Flow:
             def flow(y: Floats, given: Floats, periods: float) -> Floats:
@@ -139,7 +139,7 @@ def numbalsoda() -> Iterator[Way]:
 
         return made
 
-    for lanes in (1, 8, 16, 64):
+    for lanes in (8, 16, 64):
 
         def make(tolerance: float, rows: int, lanes: int = lanes) -> Flow:
             address = right(rows, lanes).address  # type: ignore[attr-defined]

@@ -21,8 +21,8 @@ from chainsim import solve
 
 __all__ = ["CHAINS", "steady_by_shooting", "transients_by"]
 
-CHAINS = 64
-ROUNDS = 3
+CHAINS = 256
+ROUNDS = 2
 # Four to a decade, so that nobody is asked for much more than the goal.
 TOLERANCES = tuple(10 ** (-4 - k / 4) for k in range(29))
 # Steps of Newton with the derivatives of the end by the start, then steps that keep the last derivatives.

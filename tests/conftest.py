@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("dotwave", deadline=None)
+# How long an example takes to make or to run says nothing on a busy machine.
+settings.register_profile("dotwave", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("dotwave")
 
 
