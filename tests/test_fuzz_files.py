@@ -39,7 +39,7 @@ from dotwave.sweep_io import run_sweep
 from drivers import read_exchange, read_waveform, write_exchange
 from drivers.channels import channels_of
 from drivers.samples import writer_for
-from encoders import Frame, GridShape, Scene, TargetPattern, TextSource, encode_picture
+from encoders import Frame, GridShape, Scene, TargetPattern, TextSource, TextureError, encode_picture
 from encoders.picture_reading import PictureLimits
 from planner import Ramp, plan_scene
 from planner.cache import PlanCache, cache_path
@@ -209,7 +209,9 @@ def _device(path: Path) -> None:
 def _job(path: Path) -> None:
     for item in read_job(path).sequence:
         if item.texture is not None:
-            item.texture.target(SHAPE)
+            # Whoever renders a job says which of its items does not fit the grid.
+            with contextlib.suppress(TextureError):
+                item.texture.target(SHAPE)
 
 
 def _sweep(path: Path) -> None:
