@@ -65,7 +65,7 @@ class PtyLine:
         if self._link is not None:
             try:
                 make_link(self._link, self._pty)
-            except BaseException:
+            except FileError:
                 self._hang_up()
                 raise
             self.name = str(self._link)
