@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ import pytest
 
 from chainsim import Device, Outcome, load_device
 from drivers import read_waveform, write_waveform
+from drivers.controller import VirtualController
 from drivers.emulator import LONGEST_STEP_S, Emulator
 from drivers.faults import Faults, Window
 from drivers.gate import GateLimits, pass_gate
@@ -296,6 +298,29 @@ def test_verify_works_on_what_arrived(tmp_path: Path) -> None:
     assert after.felt_text == before.felt_text
     for wanted, found in zip(before.frames, after.frames, strict=True):
         np.testing.assert_allclose(found.felt, wanted.felt, atol=1e-4)
+
+
+def test_links_that_change_leave_the_store_full(tmp_path: Path) -> None:
+    """In memory, on a clock of its own: room for events goes with the room for samples."""
+    from encoders import GridShape, TextOptions, TextSource, encode_text
+    from planner import plan_scene
+
+    device, now = load_device("linked-6x6"), 0.0
+    scene = encode_text(TextSource.of_text("Hello you"), GridShape(6, 6), TextOptions(dwell_s=0.5))
+    write_waveform(plan_scene(scene, device), tmp_path / "sent.wav")
+    manifest, reader = read_waveform(tmp_path / "sent.wav")
+    limits = GateLimits.of(device, len(manifest.channels))
+    make = partial(session_messages, manifest, reader, session=42, limits=limits)
+    session = HostSession(make, session=42, timing=Timing())
+    controller = VirtualController(ControllerSpec.of(device, buffer_s=0.5), now=now)
+    session.connected()
+    while not session.finished:
+        now += 0.002
+        controller.receive(session.poll(now), now)
+        session.receive(controller.outgoing(), now)
+    assert session.report.underruns == 0
+    # The clock starts with half of it.
+    assert session.report.least_buffer_s > 0.2
 
 
 @pytest.mark.slow
