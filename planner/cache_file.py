@@ -156,7 +156,6 @@ def _connected(path: Path, patience_s: float) -> sqlite3.Connection:
     connection = sqlite3.connect(path, timeout=patience_s, isolation_level=None, check_same_thread=False)
     # A damaged text need not be UTF-8.
     connection.text_factory = bytes
-    connection.execute("PRAGMA synchronous = OFF")
     return connection
 
 
@@ -164,6 +163,7 @@ def _lay_out(connection: sqlite3.Connection) -> None:
     """Make the table, or make sure that it is the one and nobody else's is there."""
     question = "SELECT name, sql FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
     with closing(connection.cursor()) as cursor:
+        cursor.execute("PRAGMA synchronous = OFF")
         tables = dict(cursor.execute(question).fetchall())
         if not tables:
             cursor.execute(LAYOUT.replace("TABLE", "TABLE IF NOT EXISTS"))
