@@ -208,7 +208,7 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.EROFS: f"folder {folder} is on a read-only file system; choose another folder",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
         errno.EEXIST: "there is a file of this name; choose another",
-        errno.ENAMETOOLONG: "the name is too long; shorten it",
+        errno.ENAMETOOLONG: "File name too long; shorten it",
         errno.EISDIR: "this is a folder; give the name of a file",
     }
     if error.errno == errno.ENOENT:
