@@ -79,19 +79,24 @@ def distinctness(codes: Codes, closer_than: int = APART) -> Distinctness:
     count, dots = codes.shape
     nearest, distance = np.full(count, -1, np.int64), np.full(count, -1, np.int64)
     pairs = np.zeros(dots + 1, np.int64)
-    close: list[tuple[int, int, int]] = []
+    close = np.empty((0, 3), np.int64)
     for start, apart in _rows_of_distances(codes):
         rows = np.arange(start, start + len(apart))
         later = np.arange(count) > rows[:, None]
         pairs += np.bincount(apart[later], minlength=dots + 1)
-        for row, col in np.argwhere(later & (apart < closer_than)).tolist():
-            close.append((start + row, col, int(apart[row, col])))
+        first, second = np.nonzero(later & (apart < closer_than))
+        found = np.stack([start + first, second, apart[first, second]], axis=1)
+        close = _nearest(np.concatenate([close, found]))
         if count > 1:
             apart[np.arange(len(rows)), rows] = dots + 1
             nearest[rows] = apart.argmin(axis=1)
             distance[rows] = apart.min(axis=1)
-    close.sort(key=lambda pair: (pair[2], pair[0], pair[1]))
-    return Distinctness(nearest, distance, pairs, tuple(close[: Distinctness.MOST_LISTED]))
+    return Distinctness(nearest, distance, pairs, tuple((one, other, apart) for one, other, apart in close.tolist()))
+
+
+def _nearest(pairs: Ints) -> Ints:
+    """The first `Distinctness.MOST_LISTED` by distance; in a set of equal patterns every pair is near."""
+    return pairs[np.argsort(pairs[:, 2], kind="stable")[: Distinctness.MOST_LISTED]]
 
 
 def _rows_of_distances(codes: Codes) -> Iterator[tuple[int, NDArray[np.int32]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from itertools import product
 
 import numpy as np
@@ -119,3 +120,13 @@ def test_weakened_keeps_the_dots_and_changes_what_is_felt() -> None:
         assert np.array_equal(amplitude > 0, dots)
         assert set(np.unique(amplitude)) <= {0.0, 0.5, 1.0}
     assert (weakened(dots)[2][dots] == 0.5).all()
+
+
+def test_a_set_of_equal_patterns_takes_little_memory() -> None:
+    tracemalloc.start()
+    found = distinctness(np.zeros((2500, 36), np.uint8))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found.pairs[0] == 2500 * 2499 / 2
+    assert found.close == tuple((i, j, 0) for i in range(5) for j in range(i + 1, 2500))[:10_000]
+    assert peak < 200e6
