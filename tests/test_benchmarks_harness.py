@@ -97,7 +97,7 @@ def test_the_report_says_what_is_missing_and_what_is_not_equal(tmp_path):
     assert "goal, one chain alone: at most 1 ms; 2 ms, NOT reached" in words
     assert "goal, transients: at least 10 M chain-periods/s; 20 M chain-periods/s, reached" in words
     assert "goal, transients against numbalsoda: at least 100 x; not measured (set against one chain at" in words
-    assert "goal, steady state against heyoka: at least 2000 x; 40 x, NOT reached (set against transients" in words
+    assert "goal, steady state against heyoka: at least 2000 x; 40 x, NOT reached (set against periods" in words
     assert json.loads(json.dumps(report.as_dict())) == FOUND
 
 

@@ -48,7 +48,7 @@ def on_grid(seconds: float, device: Device) -> bool:
 
 
 @each_playable
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(dwells=st.lists(st.floats(0.4, 2.0), min_size=1, max_size=6), seed=st.integers(0, 99))
 def test_the_time_line(device: Device, dwells: list[float], seed: int) -> None:
     rate = device.amplifier.rate_hz

@@ -54,6 +54,13 @@ def test_what_lam_cannot_is_said_with_the_nearest_rate() -> None:
     assert walk(LINKED, rate_hz=20.0).outcome is Outcome.OK
 
 
+@pytest.mark.parametrize(("device", "low", "high"), [(PAPER, 0.2, 6.4), (LINKED, 0.1, 40.0)], ids=["paper", "linked"])
+def test_rates_that_a_device_has(device: Device, low: float, high: float) -> None:
+    assert walk(device, rate_hz=low).outcome is walk(device, rate_hz=high).outcome is Outcome.OK
+    for beyond in (low / 2, 1.5 * high):
+        assert walk(device, rate_hz=beyond).outcome is Outcome.UNREACHABLE
+
+
 def test_width_and_rate_together_take_a_drive_for_every_actuator() -> None:
     state = walk(PAPER, width=2.0, rate_hz=1.5)
     assert state.outcome is Outcome.UNREACHABLE
