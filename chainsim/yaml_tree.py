@@ -61,9 +61,7 @@ class _Loader(_Parsing):  # type: ignore[misc]
         try:
             return super().construct_object(node, deep)
         except (ValueError, LookupError, ArithmeticError):
-            raise _complaint(
-                f"not a value of the kind {node.tag.removeprefix(_TAG)}; remove the tag, or correct it", node
-            ) from None
+            raise _complaint(f"not a value of the kind {node.tag.removeprefix(_TAG)}; correct it", node) from None
 
 
 def compose(text: str) -> yaml.Node | None:

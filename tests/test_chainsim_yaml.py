@@ -130,6 +130,8 @@ VALUES = {
     "one: {a: !!bool maybe}": "f.yaml:1: not a value of the kind bool",
     "one: {a: 0x" + "f" * 5000 + "}": "f.yaml:1: a number of 5002 characters; write fewer",
     "one: {c: " + ":".join(["59"] * 5000) + ".0}": "f.yaml:1: a number of 15001 characters; write fewer",
+    "one: {a: 1" + "0" * 390 + "}": "f.yaml:1: not a value of the kind int",
+    "one: {a: -0x" + "f" * 300 + "}": "f.yaml:1: not a value of the kind int",
     "[a]: 1": "f.yaml:1: a key that is not plain text",
     "{a: b}: 1": "f.yaml:1: a key that is not plain text",
     "one: {1: 2}": "f.yaml:1: one.1: a key that is not text; put it in quotes",
