@@ -98,7 +98,9 @@ class Harness:
     def __post_init__(self) -> None:
         self.random = random.Random(self.seed)
         self.old, _, _ = self._made("old", self.case.old)
-        self.new, self.first_s, self.whole_s = self._made("new", self.case.new)
+        # How long a run takes changes with what else the machine does: it is followed.
+        self.new, first_s, self.whole_s = self._made("new", self.case.new)
+        self.first = first_s / self.whole_s
         self.new_after_old = {**self.old, **self.new}
 
     def folder(self, name: str, old: bool = False) -> Path:
@@ -149,12 +151,15 @@ class Harness:
     def killed(self, folder: Path) -> bool:
         """Run the new command and kill it at a random moment; False when it was done before."""
         # Most moments before the first file appears are alike: a few of them do.
-        moment_s = self.random.uniform(0.9 * self.first_s, 1.02 * self.whole_s)
+        moment_s = self.random.uniform(0.9 * self.first, 1.02) * self.whole_s
+        began = time.monotonic()
         process = self.start(folder, self.case.new)
         try:
             process.wait(moment_s)
+            self.whole_s = time.monotonic() - began
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
+            self.whole_s *= 1.02
         return process.wait(30) == -signal.SIGKILL
 
     def check_killed(self, folder: Path, before: Mapping[str, bytes]) -> None:
