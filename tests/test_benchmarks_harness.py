@@ -216,6 +216,33 @@ def test_the_loosest_tolerance_at_equal_error_is_taken(shooting):
     assert best["tried"] == {"words": 1.0, "others": 0.1}
 
 
+def book(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    made = importlib.import_module("book")
+    monkeypatch.delitem(sys.modules, "book")
+    return made
+
+
+def test_prose_of_a_page_is_its_blocks_without_listings(monkeypatch):
+    prose = book(monkeypatch).Prose()
+    prose.feed(
+        "<html><head><title>no</title></head><body><h1>A  head</h1><p>some <em>words</em>\nmore"
+        "<pre>ls <b>-l</b></pre>after</p><script>x()</script><ul><li>one</li><li>two</li></ul></body></html>"
+    )
+    blocks = [" ".join(block.split()) for block in prose.blocks if block.strip()]
+    assert blocks == ["A head", "some words more", "after", "one", "two"]
+
+
+def test_a_text_is_measured_by_the_command_itself(monkeypatch):
+    made = book(monkeypatch)
+    line = made._line("few words", "Hello there", ["-m", "dotwave", "text"], ["--device", "paper-6x6", "--json"])
+    assert (line.frames, line.outcomes) == (2, {"ok": 2})
+    assert 0 < line.resident_mb < 500
+    coded = made._line("few words", "Hello there", ["-c", made.ENCODED], ["paper-6x6"])
+    assert (coded.frames, coded.megabytes) == (2, 11e-6)
+    assert "few words" in coded.words(None)
+
+
 def test_outside_a_source_tree(monkeypatch, tmp_path):
     monkeypatch.setattr("dotwave.bench.HARNESS", tmp_path / "harness.py")
     with pytest.raises(AppError, match="source tree"):
