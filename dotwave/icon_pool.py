@@ -202,6 +202,9 @@ class _Busy:
 class ClusterPool(Pool):
     """The workers of a dask.distributed scheduler; work of a lost worker goes to another one.
 
+    Dask cannot stop one task, so there is no limit of time for one: a worker that hangs is given up by the scheduler
+    after its ``worker-ttl``, a batch that ends workers after ``allowed-failures``; its tasks are then tried one by one.
+
     Raises
     ------
     AppError
