@@ -136,7 +136,9 @@ def test_outputs_that_take_nothing(dotwave: Callable[..., Any], folder: Path, tm
     assert ended.err.count("\n") == 1
     assert "journal.jsonl: this is a symbolic link; remove it" in ended.err
     (out / "journal.jsonl").unlink()
+    assert dotwave("icons", folder, "-o", out, "--workers", 1).code == 0
     for name in ("manifest.csv", "manifest.json", "contact.png", "index.html"):
+        (out / name).unlink()
         (out / name).symlink_to("/dev/full")
         ended = dotwave("icons", folder, "-o", out, "--workers", 1)
         assert (ended.code, ended.err.count("\n")) == (2, 1)
