@@ -5,9 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .equations.chain import Chain, Setting, Spread
+from .equations.coupling import Closure, CouplingKind
 from .errors import ChainError, ProfileError
 from .model.calibrated import Actuator, ActuatorSpread
-from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
 from .rung import RUNGS, Rung, RungError, Start, load_rung

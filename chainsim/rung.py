@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from .equations.chain import Chain, Setting
 from .errors import ChainError
-from .model.chain import Chain, Setting
 from .model.response import Response
 
 __all__ = ["MAX_PERIODS", "RUNGS", "Rung", "RungError", "Start", "load_rung"]

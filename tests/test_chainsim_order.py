@@ -40,13 +40,13 @@ def test_static_error_falls_with_the_square_of_the_drive():
 
 def test_harmonic_balance_is_geometric_in_the_harmonics_it_keeps():
     from chainsim.equations.basis import basis_for
-    from chainsim.equations.scaling import Stages
+    from chainsim.equations.scaled_chain import ScaledChain
     from chainsim.harmonic_balance.march import march
 
     chain = Chain(1, 0.1, 1.0)
-    stages = Stages.of(chain, Setting.of(chain, epsilon=1.0, lam=0, omega=1.1))
-    truth = march(stages, basis_for(33, False)).x[0, :2, 0]
-    errors = [np.abs(march(stages, basis_for(order, False)).x[0, :2, 0] - truth).max() for order in (1, 3, 5, 9)]
+    scaled = ScaledChain.of(chain, Setting.of(chain, epsilon=1.0, lam=0, omega=1.1))
+    truth = march(scaled, basis_for(33, False)).x[0, :2, 0]
+    errors = [np.abs(march(scaled, basis_for(order, False)).x[0, :2, 0] - truth).max() for order in (1, 3, 5, 9)]
     assert all(later < 0.1 * sooner for sooner, later in pairwise(errors))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..effects.effects import Terms
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Response, Stats
 from ..reach.ladder import solve
 from ..rung import RungError, Start

@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from ..model.chain import Chain, Closure, Setting
+from ..equations.chain import Chain, Setting
 from ..rung import Start
 from ..yamlfile import parse_model, read_model
 from .answer import plain_of, plain_with_terms
@@ -54,7 +54,7 @@ class _Setting(_Part):
     def _of_chain(self, chain: Chain) -> dict[str, Any]:
         if self.lam_x is not None or self.lam_y is not None:
             raise ValueError("setting.lam_x, lam_y: these are the links of a grid; give lam for a chain")
-        wanted = chain.n if chain.closure is Closure.RING else chain.n - 1
+        wanted = chain.law.count(chain.n)
         if isinstance(self.lam, list) and len(self.lam) != wanted:
             raise ValueError(f"setting.lam: expected a number or a list of {wanted}, got a list of {len(self.lam)}")
         return {"lam": self.lam if isinstance(self.lam, float) else np.array(self.lam, dtype=float).reshape(wanted)}

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import basis_for
-from ..equations.scaling import Stages
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.answer import Answer, response_of, stitch
 from ..harmonic_balance.harmonic_balance import balance_near
 from ..harmonic_balance.long import LONG, low_alone
-from ..model.chain import Chain, Setting
 from ..model.response import Outcome, Response, Stats
 from ..rung import MAX_PERIODS, Start, load_rung
 from .rest import sure_from_rest
@@ -146,20 +146,20 @@ def _sure(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]
     if chain.n <= LONG:
         return sure_from_rest(chain, setting, steady) & _held(chain, setting, steady)
     sure = np.zeros(len(setting), dtype=bool)
-    if not chain.feed_forward or chain.rows > 1 or setting.preload.any() or setting.bias.any():
+    if not chain.law.in_line or setting.preload.any() or setting.bias.any():
         return sure
     for index in np.flatnonzero(steady.stable):
-        stages = Stages.of(chain, setting[index : index + 1])
+        scaled = ScaledChain.of(chain, setting[index : index + 1])
         with np.errstate(all="ignore"):
-            sure[index] = low_alone(stages, steady.phasor[index] * stages.length)
+            sure[index] = low_alone(scaled, steady.phasor[index] * scaled.length)
     return sure
 
 
 def _held(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]:
     """Whether constant forces that set in suddenly cannot throw an oscillator out of its well; bool, shape (N,)."""
-    stages = Stages.of(chain, setting)
-    top = np.sqrt(np.maximum(stages.k, 0.0) / np.maximum(-stages.sign, 1e-300))
-    return np.asarray((np.abs(steady.mean.T) * stages.length <= THROWN * top).all(axis=0))
+    scaled = ScaledChain.of(chain, setting)
+    top = np.sqrt(np.maximum(scaled.k, 0.0) / np.maximum(-scaled.sign, 1e-300))
+    return np.asarray((np.abs(steady.mean.T) * scaled.length <= THROWN * top).all(axis=0))
 
 
 def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArray[np.intp], Response]]:
@@ -193,14 +193,14 @@ def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArra
 
 
 def _unanswered(chain: Chain, setting: Setting, outcome: NDArray[np.object_]) -> Response:
-    stages = Stages.of(chain, setting)
+    scaled = ScaledChain.of(chain, setting)
     basis = basis_for(1, False)
-    nothing = np.full((stages.n, basis.size, len(stages)), np.nan)
-    unknown = np.full((len(stages), stages.n, 2), np.nan, dtype=np.complex128)
-    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
-    estimate = np.full(len(stages), np.inf)
+    nothing = np.full((scaled.n, basis.size, len(scaled)), np.nan)
+    unknown = np.full((len(scaled), scaled.n, 2), np.nan, dtype=np.complex128)
+    branch = np.zeros((scaled.n, len(scaled)), dtype=np.int8)
+    estimate = np.full(len(scaled), np.inf)
     answer = Answer(basis, nothing, outcome, branch, estimate, unknown)
-    silent = response_of(stages, "ode", answer, Stats(), 0.0)
+    silent = response_of(scaled, "ode", answer, Stats(), 0.0)
     return replace(silent, stats=Stats())
 
 
