@@ -11,7 +11,7 @@ from .errors import ChainError, ProfileError
 from .model.calibrated import Actuator, ActuatorSpread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
-from .rung import RUNGS, Rung, RungError, Start, load_rung
+from .rung import RUNGS, TERMS, Rung, RungError, Start, load_rung
 from .yamlfile import parse_model, read_model
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RUNGS",
+    "TERMS",
     "Actuator",
     "ActuatorSpread",
     "Amplifier",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import RUNGS, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
+from chainsim import RUNGS, TERMS, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
 
 CHAIN = Chain(3, 0.05, -1.0)
 
@@ -88,12 +88,17 @@ def test_auto_takes_the_cheapest_rung_that_meets_the_tolerance():
     assert solve(CHAIN, still, tol=1e-6).rung == "static"
 
 
+FEW = Setting.of(CHAIN, epsilon=1e-3, lam=0.2, omega=1.2)
+
+
 @pytest.mark.parametrize("name", list(RUNGS))
 def test_every_rung_states_its_claims(name):
     rung = load_rung(name)
     assert rung.name == name
     assert rung.order
     assert rung.valid
+    assert rung.models <= TERMS
+    assert rung.lists_branches == (rung.refusal(CHAIN, FEW, Start.ALL) == "" and name != "linear")
     assert rung.refusal(CHAIN, Setting.of(CHAIN, epsilon=1e-3, lam=0.2, omega=1.2), Start.REST) == ""
 
 

@@ -14,7 +14,7 @@ from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.answer import defect
 from ..harmonic_balance.march import branches_of
 from ..model.response import Outcome, Response
-from ..rung import Rung, Start
+from ..rung import TERMS, Rung, Start
 from .envelope import slow_refusal
 from .flow import SlowFlow
 from .linear import times
@@ -33,6 +33,7 @@ class EnvelopeRung(Rung):
     name = "envelope"
     order = "2 in delta, lam, detuning and beta a^2 for a transient; a steady state to O(beta^2 a^4), with bias O(a^3)"
     valid = "delta, lam, detuning, beta a^2 << 1, and beta z0 a << 1 about an equilibrium z0; transients and slow beats"
+    models = TERMS
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Strong damping, soft oscillators, too many of them, every branch."""

@@ -12,7 +12,7 @@ from ..equations.basis import Basis, basis_for, resize
 from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
-from ..rung import Rung, Start
+from ..rung import TERMS, Rung, Start
 from .answer import ORDERS, Answer, defect, finer, outcomes, response_of, stitch
 from .branches import all_branches
 from .homotopy import blank, filled, let_down, undriven
@@ -37,6 +37,8 @@ class HarmonicBalanceRung(Rung):
     name = "harmonic_balance"
     order = "geometric in the number of harmonics; with 1 and 3 alone O(beta^2 a^4)"
     valid = "any response locked to the drive"
+    models = TERMS
+    lists_branches = True
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""

@@ -22,7 +22,7 @@ from ..equations.basis import Basis, basis_for, resize
 from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
-from ..rung import RungError
+from ..rung import RUNGS, RungError, load_rung
 from .answer import ORDERS, Answer, defect, finer, outcomes, response_of
 from .joint import follow_load, newton_joint
 from .joint_roots import Amplitudes, roots_of
@@ -71,7 +71,7 @@ def joint_branches(chain: Chain, setting: Setting, *, tol: float, rung: str) -> 
     RungError
         For another rung, more than one setting, or a chain that can be solved in turn.
     """
-    if rung not in ("one_harmonic", "harmonic_balance", "static"):
+    if rung not in RUNGS or not load_rung(rung).lists_branches:
         raise RungError(f"rung {rung}: it does not list every branch; use rung harmonic_balance or auto")
     if len(setting) != 1 or chain.feed_forward:
         raise RungError(f"start all: expected one setting of a ring or bidirectional chain, got {len(setting)}")

@@ -31,6 +31,7 @@ class LinearRung(Rung):
     name = "linear"
     order = "O(beta a^2) over the distance to resonance"
     valid = "beta a^2 << max(delta, lam)"
+    models = frozenset[str]()
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """It answers every chain."""

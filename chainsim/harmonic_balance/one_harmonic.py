@@ -25,6 +25,8 @@ class OneHarmonicRung(Rung):
     name = "one_harmonic"
     order = "O(beta^2 a^4) over the distance to the fold"
     valid = "beta a^2 << 1 (the third harmonic is beta a^2 / 32 of the first)"
+    models = frozenset({"nonlinearity"})
+    lists_branches = True
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""

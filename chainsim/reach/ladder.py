@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,10 @@ from ..model.response import Outcome, Response, Stats
 from ..rung import MAX_PERIODS, Start, load_rung
 from .rest import sure_from_rest
 
-__all__ = ["solve"]
+if TYPE_CHECKING:
+    from ..harmonic_balance.joint_branches import Branches
+
+__all__ = ["every_branch", "lists_jointly", "solve"]
 
 # Distance, relative to each oscillator, at which the answer of harmonic balance is the orbit that was integrated (known
 # to 1e-5). Two orbits may differ in the far end of a chain alone; FAINT of the largest oscillator nothing is seen.
@@ -26,8 +30,6 @@ SAME_ORBIT = 1e-2
 FAINT = 1e-8
 # Of the hilltop, for a mean: a sudden force swings to twice as far and more, and at 0.2955 it throws it over.
 THROWN = 0.25
-# Rungs that list every branch, also of oscillators that act on each other.
-LISTED = ("static", "one_harmonic", "harmonic_balance")
 
 
 def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
@@ -60,17 +62,14 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         raise ValueError("setting: expected at least one setting, got none")
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
-    if way is Start.ALL and chain.betas.any() and not chain.feed_forward and rung in ("auto", *LISTED):
-        from ..harmonic_balance.joint_branches import joint_branches
-
-        name = rung if rung != "auto" else _first(setting)
-        return joint_branches(chain, setting, tol=tol, rung=name).response
+    if way is Start.ALL and lists_jointly(chain, rung):
+        return every_branch(chain, setting, tol=tol, rung=rung).response
     if rung != "auto":
         return load_rung(rung).solve(chain, setting, tol=tol, start=way)
     if not chain.betas.any():
         return _linear(chain, setting, tol, way)
     if way is Start.ALL:
-        return load_rung(_first(setting)).solve(chain, setting, tol=tol, start=way)
+        return load_rung(_listing(setting)).solve(chain, setting, tol=tol, start=way)
     steady = _cheapest(chain, setting, tol, way)
     if way is Start.REST:
         return _from_rest(chain, setting, tol, steady)
@@ -79,8 +78,27 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
     return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
 
 
-def _first(setting: Setting) -> str:
-    """The rung that lists every branch."""
+def lists_jointly(chain: Chain, rung: str) -> bool:
+    """Whether `every_branch` answers start all: a rung, or auto, that lists the branches of all oscillators at once."""
+    joint = bool(chain.betas.any()) and not chain.feed_forward
+    return joint and (rung == "auto" or load_rung(rung).lists_branches)
+
+
+def every_branch(chain: Chain, setting: Setting, *, tol: float, rung: str) -> Branches:
+    """`joint_branches` by a rung, or by the one that ``auto`` takes.
+
+    Raises
+    ------
+    RungError
+        As `joint_branches`.
+    """
+    from ..harmonic_balance.joint_branches import joint_branches
+
+    return joint_branches(chain, setting, tol=tol, rung=rung if rung != "auto" else _listing(setting))
+
+
+def _listing(setting: Setting) -> str:
+    """The rung by which ``auto`` lists every branch."""
     return "harmonic_balance" if setting.epsilon.any() else "static"
 
 
