@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .averaging.decide import Decision, decide
     from .averaging.envelope import follow
     from .batch.sweep import SweepResult, sweep, unit_of
-    from .continuation.continuation import continue_branch
+    from .continuation.path import continue_branch
     from .continuation.spectrum import (
         critical_lam,
         delta_from_critical_lam,
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from .effects.tones import two_tones
     from .files.simulation import Simulation, parse_simulation, read_simulation, simulate
     from .files.sweep import SettingSweep, read_sweep
-    from .harmonic_balance.harmonic_balance import balance_near
     from .harmonic_balance.joint_branches import Branches, joint_branches
+    from .harmonic_balance.rung import balance_near
     from .harmonic_balance.sensitivity import Gradient, gradient
     from .reach.ladder import solve
     from .time_domain.as_built import AsBuilt
@@ -148,7 +148,7 @@ _LATE = {
     "spectrum_curve": "continuation.spectrum",
     "delta_from_critical_lam": "continuation.spectrum",
     "critical_lam": "continuation.spectrum",
-    "continue_branch": "continuation.continuation",
+    "continue_branch": "continuation.path",
     "SettingSweep": "files.sweep",
     "read_sweep": "files.sweep",
     "SweepResult": "batch.sweep",
@@ -160,7 +160,7 @@ _LATE = {
     "GridIntegrator": "time_domain.integrate",
     "Reached": "time_domain.ode",
     "Simulation": "files.simulation",
-    "balance_near": "harmonic_balance.harmonic_balance",
+    "balance_near": "harmonic_balance.rung",
     "gradient": "harmonic_balance.sensitivity",
     "parse_simulation": "files.simulation",
     "reached_from_rest": "time_domain.ode",

@@ -19,7 +19,7 @@ RUNGS = {
     "static": ("chainsim.harmonic_balance.static", "StaticRung"),
     "linear": ("chainsim.harmonic_balance.linear", "LinearRung"),
     "one_harmonic": ("chainsim.harmonic_balance.one_harmonic", "OneHarmonicRung"),
-    "harmonic_balance": ("chainsim.harmonic_balance.harmonic_balance", "HarmonicBalanceRung"),
+    "harmonic_balance": ("chainsim.harmonic_balance.rung", "HarmonicBalanceRung"),
     "envelope": ("chainsim.averaging.rung", "EnvelopeRung"),
     "ode": ("chainsim.time_domain.ode", "OdeRung"),
 }

@@ -8,7 +8,7 @@ mean C, second harmonic E and third harmonic B, every oscillator obeys
     C = -(k + ..)^-1 (3/2) beta z0 |A|^2, E = -(.. - 4 omega^2 + 2 i delta omega)^-1 (3/2) beta z0 A^2,
     B = -((beta/4) A^3 + 3 beta z0 A E)/(k + .. - 9 omega^2 + 3 i delta omega).
 
-Order 1 drops A'' and B. Order 2 splits A = a + c as `envelope_linear` does, exactly in all that is linear: a turns
+Order 1 drops A'' and B. Order 2 splits A = a + c as `linear` does, exactly in all that is linear: a turns
 slowly, c follows its drive. Nothing faster than the detuning is left to integrate, and both orders have the exact fixed
 points of their balance.
 """

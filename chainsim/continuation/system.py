@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..equations.basis import Basis
 from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
-from ..floquet.floquet import chain_multipliers
+from ..floquet.hill import chain_multipliers
 from ..floquet.monodromy import joint_multipliers
 from ..harmonic_balance.balance import linearise
 from ..harmonic_balance.joint import follow_load, newton_joint

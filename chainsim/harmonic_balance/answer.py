@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for
 from ..equations.scaled_chain import ScaledChain
-from ..floquet.floquet import chain_multipliers
+from ..floquet.hill import chain_multipliers
 from ..floquet.monodromy import joint_multipliers
 from ..model.response import Outcome, Response, Stats
 from .joint import correct_joint, rounding_of

@@ -14,7 +14,7 @@ from ..model.response import Outcome, Response, Stats
 from ..rung import Rung, Start
 from .answer import Answer, defect, outcomes, response_of
 from .branches import all_branches
-from .harmonic_balance import branch_refusal, lower_branch
+from .rung import branch_refusal, lower_branch
 
 __all__ = ["OneHarmonicRung"]
 

@@ -13,8 +13,8 @@ from ..equations.basis import basis_for
 from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.answer import Answer, response_of, stitch
-from ..harmonic_balance.harmonic_balance import balance_near
 from ..harmonic_balance.long import LONG, low_alone
+from ..harmonic_balance.rung import balance_near
 from ..model.response import Outcome, Response, Stats
 from ..rung import MAX_PERIODS, Start, load_rung
 from .rest import sure_from_rest
@@ -73,7 +73,7 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
     steady = _cheapest(chain, setting, tol, way)
     if way is Start.REST:
         return _from_rest(chain, setting, tol, steady)
-    from .envelope_ramp import from_ramp
+    from .ramp import from_ramp
 
     return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
 

@@ -15,7 +15,7 @@ from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.march import branches_of
 from ..model.response import Branch, Outcome, Response, Stats
 from ..rung import MAX_PERIODS, TERMS, Rung, RungError, Start
-from .ode_ramp import settle_ramp
+from .ramp import settle_ramp
 from .shooting import FAR_SMALLER, Orbits, shoot
 from .transient import Settled, settle
 
