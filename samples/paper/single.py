@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, GridIntegrator, Setting, load_device
-from chainsim.continuation.continuation import Path as Branch
-from chainsim.continuation.continuation import continue_branch
+from chainsim.continuation.path import Path as Branch
+from chainsim.continuation.path import continue_branch
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
 
