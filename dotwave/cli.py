@@ -22,8 +22,7 @@ from .cli_pictures import picture_app
 from .cli_plan import plan_app
 from .cli_play import play_app
 from .cli_study import study_app
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, say
-from .command import finish as _finish
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
 from .completion import completed_devices, completed_files
 from .ending import ended
 from .errors import Terminated

@@ -104,8 +104,7 @@ def emulate(
     """
     from drivers import Faults
 
-    from .emulate import emulate as run
-    from .emulate import parse_window
+    from .emulate import emulate as run, parse_window
 
     faults = Faults(
         drop=drop, corrupt=corrupt, duplicate=duplicate, delay_s=delay, stall=parse_window(stall, "stall"),

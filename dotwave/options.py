@@ -53,9 +53,7 @@ def text_options(**given: Any) -> TextOptions:
     encoders.EncodeError
         When a value is out of range.
     """
-    from encoders import Presentation as Shown
-    from encoders import TextOptions
-    from encoders import Undefined as Policy
+    from encoders import Presentation as Shown, TextOptions, Undefined as Policy
 
     chosen = {name: value for name, value in given.items() if value is not None}
     if "undefined" in chosen:

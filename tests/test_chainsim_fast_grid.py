@@ -4,8 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from chainsim import Chain, Outcome, Setting, solve
 from chainsim.batch.sweep import OUTCOMES, sweep

@@ -5,8 +5,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from chainsim import Chain, Outcome, RungError, Setting, solve
 from chainsim.equations.basis import basis_for

@@ -13,8 +13,9 @@ import pytest
 from chainsim import ProfileError, read_model
 from chainsim.model.device import Device
 from drivers import FileError
-from drivers.samples import check_suffix
-from encoders import TextSource, UnsupportedSource, sources
+from drivers.formats.samples import check_suffix
+from encoders import TextSource, UnsupportedSource
+from encoders.braille.readers import sources
 
 ROOT = Path(__file__).resolve().parent.parent
 MEMORY = 4 << 30

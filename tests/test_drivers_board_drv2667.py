@@ -12,16 +12,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from chainsim import Device, load_device
 from drivers import WavWriter, channels_of, read_waveform
-from drivers.audio import AudioError, AudioUnavailable, parse_outputs, play_audio
-from drivers.board_serial import BoardEmulator, Firmware, grid_line, play_grid_lines
-from drivers.drv2667 import GAIN_VOLTS, BoardRefusal, SynthRecord, frequency_byte, gain_for, load_writes, synth_records
-from drivers.manifest import digest_of
-from drivers.tactile_board import BoardPlan, plan_board, socket_of
+from drivers.sinks.audio import AudioError, AudioUnavailable, parse_outputs, play_audio
+from drivers.sinks.board_serial import BoardEmulator, Firmware, grid_line, play_grid_lines
+from drivers.sinks.drv2667 import (
+    GAIN_VOLTS,
+    BoardRefusal,
+    SynthRecord,
+    frequency_byte,
+    gain_for,
+    load_writes,
+    synth_records,
+)
+from drivers.sinks.tactile_board import BoardPlan, plan_board, socket_of
+from drivers.waveform.manifest import digest_of
 
 DEVICE = load_device("independent-6x6")
 RATE = DEVICE.amplifier.rate_hz
@@ -365,7 +372,7 @@ def test_audio_that_is_not_there_is_one_line(tmp_path: Path, card: FakeCard, mon
     def no_port_audio(name: str) -> None:
         raise OSError("PortAudio library not found")
 
-    monkeypatch.setattr("drivers.audio.import_module", no_port_audio)
+    monkeypatch.setattr("drivers.sinks.audio.import_module", no_port_audio)
     with pytest.raises(AudioUnavailable, match="apt install libportaudio2"):
         play_audio(manifest, reader, device=None, outputs=range(36))
     monkeypatch.setitem(sys.modules, "sounddevice", None)

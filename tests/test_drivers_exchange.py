@@ -7,7 +7,7 @@ import pytest
 
 from chainsim import load_device
 from drivers import EXCHANGE_SUFFIXES, FileError, UnreadableWaveform, WaveformError, read_exchange, write_exchange
-from drivers.haptic_curves import haptic_curves
+from drivers.exchange.curves import haptic_curves
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
 

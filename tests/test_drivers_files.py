@@ -16,7 +16,7 @@ import pytest
 
 from chainsim import load_device
 from drivers import FileError, UnreadableWaveform, atomic_file, atomic_files, read_waveform, settled, write_waveform
-from drivers.parts import part_of
+from drivers.files.parts import part_of
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import Plan, plan_scene
 
@@ -55,7 +55,7 @@ def test_a_planted_link_is_not_followed(tmp_path: Path, monkeypatch: pytest.Monk
     with atomic_file(tmp_path / "x") as file:
         file.write(b"1")
     # Even a name that was guessed does not help.
-    monkeypatch.setattr("drivers.files.secrets.token_hex", lambda _: TOKEN)
+    monkeypatch.setattr("drivers.files.whole.secrets.token_hex", lambda _: TOKEN)
     (tmp_path / f".x.dotwave-{TOKEN}.part").symlink_to(victim)
     with pytest.raises(FileError, match="x: there is a file"), atomic_file(tmp_path / "x"):
         raise AssertionError("opened")

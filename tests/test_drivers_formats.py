@@ -9,8 +9,8 @@ import pytest
 from chainsim import load_device
 from drivers import SUFFIXES, FileError, UnreadableWaveform, Waveform, WaveformError, read_waveform, write_waveform
 from drivers.channels import Channel, Role
-from drivers.npz import NpzReader
-from drivers.raw import RawReader
+from drivers.formats.npz import NpzReader
+from drivers.formats.raw import RawReader
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
 

@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 import soundfile
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-import drivers.pair
+import drivers.waveform.file
 from chainsim import Amplifier, Device, Outcome, Span, load_device
 from drivers import (
     DriverError,
@@ -183,7 +182,7 @@ def test_the_same_plan_gives_the_same_bytes_for_any_block(
     for index, block in enumerate((4096, 4096, 1, 777, 10**6)):
         folder = tmp_path / str(index)
         folder.mkdir()
-        monkeypatch.setattr(drivers.pair, "BLOCK", block)
+        monkeypatch.setattr(drivers.waveform.file, "BLOCK", block)
         write_waveform(plan, folder / "x.wav", encoding=encoding)
         found.add(((folder / "x.wav").read_bytes(), (folder / "x.json").read_bytes()))
     assert len(found) == 1
@@ -213,7 +212,7 @@ def test_any_text_and_number_survives_the_manifest(
 
 
 def test_progress_counts_the_seconds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drivers.pair, "BLOCK", 1600)
+    monkeypatch.setattr(drivers.waveform.file, "BLOCK", 1600)
     seen: list[float] = []
     write_waveform(plan_of("linked-6x6"), tmp_path / "x.wav", progress=seen.append)
     assert seen == [0.2, 0.4]
@@ -254,7 +253,7 @@ def stop_at_second_block(error: BaseException) -> Callable[[float], None]:
 def test_an_interrupted_write_leaves_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, before: dict[str, bytes]
 ) -> None:
-    monkeypatch.setattr(drivers.pair, "BLOCK", 500)
+    monkeypatch.setattr(drivers.waveform.file, "BLOCK", 500)
     for name, content in before.items():
         (tmp_path / name).write_bytes(content)
     with pytest.raises(type(error)):

@@ -20,7 +20,7 @@ from dotwave.emulate import EmulateReport, dots_as_braille, emulate, parse_windo
 from dotwave.errors import AppError
 from dotwave.play import buffer_notes, list_ports, play
 from drivers import BoardEmulator, BoardRefusal, Faults, Firmware, StreamReport, Window, read_waveform, write_waveform
-from drivers.pty_line import PtyLine
+from drivers.protocol.pty_line import PtyLine
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import plan_scene
 

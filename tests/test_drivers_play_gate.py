@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from chainsim import Device, load_device
 from drivers import UnreadableWaveform, WavWriter, channels_of, read_waveform
-from drivers.gate import Gate, GateLimits, GateRefusal, GateReport, pass_gate
-from drivers.manifest import digest_of
+from drivers.safety import Gate, GateLimits, GateRefusal, GateReport, pass_gate
+from drivers.waveform.manifest import digest_of
 
 RATE = 8000
 DEVICE = load_device("paper-6x6")

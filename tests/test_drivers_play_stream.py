@@ -18,16 +18,16 @@ import pytest
 
 from chainsim import Device, Outcome, load_device
 from drivers import read_waveform, write_waveform
-from drivers.controller import VirtualController
-from drivers.emulator import LONGEST_STEP_S, Emulator
-from drivers.faults import Faults, Window
-from drivers.gate import GateLimits, pass_gate
-from drivers.messages import FULL_CODE
-from drivers.outgoing import session_messages
-from drivers.playout import ControllerSpec, OutputBlock
-from drivers.serial_play import NoAnswer, run_session
-from drivers.stream import HostSession, StreamReport, Timing
-from drivers.uart import PortUnavailable, Uart, serial_ports
+from drivers.protocol.emulator import LONGEST_STEP_S, Emulator
+from drivers.protocol.faults import Faults, Window
+from drivers.protocol.host_session import HostSession, StreamReport, Timing
+from drivers.protocol.messages import FULL_CODE
+from drivers.protocol.outgoing import session_messages
+from drivers.protocol.playout import ControllerSpec, OutputBlock
+from drivers.protocol.virtual_controller import VirtualController
+from drivers.safety import GateLimits, pass_gate
+from drivers.sinks.serial_play import NoAnswer, run_session
+from drivers.sinks.uart import PortUnavailable, Uart, serial_ports
 from encoders import Frame, TargetPattern
 from planner import ChainState, FramePlan, Margins, Plan, Ramp
 

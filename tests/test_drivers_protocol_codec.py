@@ -15,11 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from drivers.cobs_frame import FrameError, FrameSplitter, cobs_decode, cobs_encode
-from drivers.messages import (
+from drivers.protocol.cobs import FrameError, FrameSplitter, cobs_decode, cobs_encode
+from drivers.protocol.messages import (
     Ack,
     Bias,
     Capabilities,
@@ -34,7 +33,7 @@ from drivers.messages import (
     Tone,
     Tones,
 )
-from drivers.packet import (
+from drivers.protocol.packet import (
     LONGEST_FRAME,
     MAX_PAYLOAD,
     ORDERED,

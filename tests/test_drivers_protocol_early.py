@@ -15,15 +15,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.controller import VirtualController
-from drivers.early import MOST_EARLY, EarlyPackets
-from drivers.faults import Faults, FaultyLine
-from drivers.messages import VERSION, Ack, Capabilities, Flag, LinkCoupling, Mark, Marked, Samples, Start, State
-from drivers.outgoing import End, Message
-from drivers.packet import Kind, Packet, PacketReader, encode
-from drivers.playout import ControllerSpec, Event
-from drivers.stream import HELLO, STOP, HostSession, Timing
-from drivers.under_way import UnderWay
+from drivers.protocol.early import MOST_EARLY, EarlyPackets
+from drivers.protocol.faults import Faults, FaultyLine
+from drivers.protocol.host_session import HELLO, STOP, HostSession, Timing
+from drivers.protocol.messages import (
+    VERSION,
+    Ack,
+    Capabilities,
+    Flag,
+    LinkCoupling,
+    Mark,
+    Marked,
+    Samples,
+    Start,
+    State,
+)
+from drivers.protocol.outgoing import End, Message
+from drivers.protocol.packet import Kind, Packet, PacketReader, encode
+from drivers.protocol.playout import ControllerSpec, Event
+from drivers.protocol.under_way import UnderWay
+from drivers.protocol.virtual_controller import VirtualController
 
 ROOT = Path(__file__).resolve().parent.parent
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]

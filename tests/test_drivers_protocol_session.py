@@ -9,13 +9,24 @@ from functools import partial
 import numpy as np
 import pytest
 
-from drivers.controller import VirtualController
-from drivers.faults import Faults, FaultyLine, Window
-from drivers.messages import FULL_CODE, Bias, Capabilities, LinkCoupling, Mark, Samples, Start, State, Tone, Tones
-from drivers.outgoing import End, Message
-from drivers.packet import Kind, Packet, PacketReader, encode
-from drivers.playout import ControllerSpec, OutputBlock
-from drivers.stream import STOP, ControllerRefused, HostSession, SessionLost, Timing
+from drivers.protocol.faults import Faults, FaultyLine, Window
+from drivers.protocol.host_session import STOP, ControllerRefused, HostSession, SessionLost, Timing
+from drivers.protocol.messages import (
+    FULL_CODE,
+    Bias,
+    Capabilities,
+    LinkCoupling,
+    Mark,
+    Samples,
+    Start,
+    State,
+    Tone,
+    Tones,
+)
+from drivers.protocol.outgoing import End, Message
+from drivers.protocol.packet import Kind, Packet, PacketReader, encode
+from drivers.protocol.playout import ControllerSpec, OutputBlock
+from drivers.protocol.virtual_controller import VirtualController
 
 STEP_S = 0.001
 SPEC = ControllerSpec(

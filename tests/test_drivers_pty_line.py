@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivers import FileError
-from drivers.pty_line import PtyLine, make_link
+from drivers.protocol.pty_line import PtyLine, make_link
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 

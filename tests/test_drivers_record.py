@@ -20,13 +20,13 @@ from chainsim import Device, load_device
 from dotwave.emulate import emulate
 from dotwave.verify import verify
 from drivers import read_waveform, write_waveform
-from drivers.controller import VirtualController
-from drivers.emulator import Emulator
-from drivers.gate import GateLimits
-from drivers.messages import FULL_CODE, Samples, Start
-from drivers.outgoing import End, Message, session_messages
-from drivers.playout import ControllerSpec
-from drivers.record import ArrivalRecorder, CutShort
+from drivers.protocol.emulator import Emulator
+from drivers.protocol.messages import FULL_CODE, Samples, Start
+from drivers.protocol.outgoing import End, Message, session_messages
+from drivers.protocol.playout import ControllerSpec
+from drivers.protocol.record import ArrivalRecorder, CutShort
+from drivers.protocol.virtual_controller import VirtualController
+from drivers.safety import GateLimits
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import plan_scene
 

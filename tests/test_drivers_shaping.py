@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from chainsim import load_device
 from dotwave.verify import verify
 from drivers import write_waveform
-from drivers.shaping import Shaper
+from drivers.waveform.shaping import Shaper
 from encoders import Frame, GridShape, Scene, levels
 from planner import Plan, plan_scene
 

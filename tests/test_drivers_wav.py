@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from drivers import Channel, DriverError, LimitError, Role, UnreadableWaveform, WavReader, WavWriter
-from drivers.wav import RIFF_LIMIT
+from drivers.formats.wav import RIFF_LIMIT
 
 RATE = 8000
 VOLTS = 100.0

@@ -10,15 +10,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from chainsim import Amplifier, Device, Outcome, Span, load_device
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
-from drivers.coupling import CouplingWriter, LamTrack
-from drivers.hold import hold_inverse
-from drivers.timeline import Stretch
+from drivers.waveform.coupling import CouplingWriter, LamTrack
+from drivers.waveform.hold import hold_inverse
+from drivers.waveform.timeline import Stretch
 from encoders import Frame, TargetPattern
 from planner import ChainState, FramePlan, Margins, Plan, Ramp
 

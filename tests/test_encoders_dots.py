@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from encoders import (
     GridShape,
@@ -16,9 +15,9 @@ from encoders import (
     cells_to_brf,
     read_cells,
 )
-from encoders.dots import blocks
-from encoders.layout import Layout
-from encoders.presentation import presenter
+from encoders.braille.dots import blocks
+from encoders.braille.layout import Layout
+from encoders.braille.presentation import presenter
 
 
 def encoding_of(layout: Layout) -> dict[str, int]:

@@ -1,11 +1,10 @@
 """Words on pages: nothing lost, nothing doubled, and the dots alone say where words end."""
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from encoders import GridShape, LayoutError, join_pages
-from encoders.layout import NARROW, Layout, PlacedWord, paginate
+from encoders.braille.layout import NARROW, Layout, PlacedWord, paginate
 
 # Blank-free cells with many hyphens, the one cell that is special.
 WORD = st.text(st.sampled_from("⠁⠃⠤"), min_size=1, max_size=30)

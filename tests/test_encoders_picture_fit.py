@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
-from encoders.picture_climb import climbed, neighbours, swept
-from encoders.picture_fit import Window, best_patterns, choose_windows, sampled
-from encoders.picture_options import Fit, PictureOptions, Style
-from encoders.picture_similarity import agreement, quadratics, target_of
-from encoders.pictures import encode_picture, explain_picture
+from encoders.picture.climb import climbed, neighbours, swept
+from encoders.picture.fit import Window, best_patterns, choose_windows, sampled
+from encoders.picture.options import Fit, PictureOptions, Style
+from encoders.picture.pictures import encode_picture, explain_picture
+from encoders.picture.similarity import agreement, quadratics, target_of
 from encoders.scene import GridShape
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from encoders.picture_errors import PictureError
-from encoders.picture_reading import PictureLimits
-from encoders.pictures import encode_picture
+from encoders.picture.errors import PictureError
+from encoders.picture.pictures import encode_picture
+from encoders.picture.limits import PictureLimits
 from encoders.scene import GridShape
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"

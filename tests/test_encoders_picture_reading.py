@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from encoders.picture_errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge
-from encoders.picture_reading import PictureLimits, linear, read_picture
+from encoders.picture.errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge
+from encoders.picture.limits import PictureLimits
+from encoders.picture.reading import linear, read_picture
 
 RED_LEFT = np.zeros((8, 12, 3), np.uint8)
 RED_LEFT[:, :6] = (200, 30, 10)

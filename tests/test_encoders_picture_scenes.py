@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
-from encoders.picture_errors import EmptyPicture, PictureError
-from encoders.picture_options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
-from encoders.pictures import PictureScene, encode_picture, explain_picture
+from encoders.picture.errors import EmptyPicture, PictureError
+from encoders.picture.options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
+from encoders.picture.pictures import PictureScene, encode_picture, explain_picture
 from encoders.scene import GridShape, PatternKind, Scene
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"

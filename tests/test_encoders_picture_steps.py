@@ -6,15 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from encoders.picture_errors import PictureError
-from encoders.picture_figure import figure_steps, style_of
-from encoders.picture_options import Fit, Invert, PictureOptions, Style, Threshold
-from encoders.picture_regions import TEXTURES, dot_regions, textured
-from encoders.picture_steps import (
+from encoders.picture.errors import PictureError
+from encoders.picture.figure import figure_steps, style_of
+from encoders.picture.options import Fit, Invert, PictureOptions, Style, Threshold
+from encoders.picture.regions import TEXTURES, dot_regions, textured
+from encoders.picture.steps import (
     adaptive_figure,
     background_light,
     composite,
@@ -30,7 +29,7 @@ from encoders.picture_steps import (
     thickened,
     widened,
 )
-from encoders.picture_views import views
+from encoders.picture.views import views
 from encoders.scene import PatternKind
 
 masks = arrays(np.bool_, st.tuples(st.integers(3, 24), st.integers(3, 24)))

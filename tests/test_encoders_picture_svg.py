@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from encoders.picture_errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge
-from encoders.picture_reading import Picture, PictureLimits, read_picture
-from encoders.vector import tame_svg
+from encoders.picture.errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge
+from encoders.picture.limits import PictureLimits
+from encoders.picture.reading import Picture, read_picture
+from encoders.picture.vector import tame_svg
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 8 8">'
 DOT = '<rect width="1" height="1"/>'

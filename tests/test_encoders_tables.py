@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from encoders import LouisMissing, TableMissing, list_tables, louis_binding, louis_cure, resolve_tables
-from encoders.tables import foreign_tables, hyphenation_tables, table_dots
+from encoders import LouisMissing, TableMissing, list_tables, resolve_tables
+from encoders.braille import louis_binding, louis_cure
+from encoders.braille.tables import foreign_tables, hyphenation_tables, table_dots
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -4,13 +4,12 @@ import shutil
 import subprocess
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from encoders import Undefined, UndefinedCharacter, back_translate, translate
-from encoders.alphabet import alphabet
-from encoders.report import ReportLog
-from encoders.undefined import name_of, writable
+from encoders.braille.alphabet import alphabet
+from encoders.braille.report import ReportLog
+from encoders.braille.undefined import name_of, writable
 
 UEB = ("en-ueb-g2.ctb",)
 BACKSLASH_X = "⡳⠭"  # the library's own escape for what it cannot write

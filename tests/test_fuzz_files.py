@@ -38,9 +38,9 @@ from dotwave.measured_sweeps import read_sweeps
 from dotwave.sweep_io import run_sweep
 from drivers import read_exchange, read_waveform, write_exchange
 from drivers.channels import channels_of
-from drivers.samples import writer_for
+from drivers.formats.samples import writer_for
 from encoders import Frame, GridShape, Scene, TargetPattern, TextSource, TextureError, encode_picture
-from encoders.picture_reading import PictureLimits
+from encoders.picture.limits import PictureLimits
 from planner import Ramp, plan_scene
 from planner.cache import PlanCache, cache_path
 

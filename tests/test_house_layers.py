@@ -7,6 +7,7 @@ import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,43 @@ def test_layers(path: Path) -> None:
         assert level <= len(path.relative_to(ROOT).parts) - 1, f"{path}: the relative import leaves {package}"
 
 
+def name_of(path: Path) -> str:
+    """Dotted name of a module; of a package that of its folder."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def known_by() -> dict[str, set[str]]:
+    """Module -> modules of the same package it imports, at any place in its text. Packages themselves are left out:
+    their tables of public names know every module."""
+    modules = {name_of(path): path for path in MODULES if path.name != "__init__.py"}
+    graph: dict[str, set[str]] = {name: set() for name in modules}
+    for importing, path in modules.items():
+        for module, name, level in imports(TREES[path]):
+            if level:
+                base = ".".join(filter(None, [*path.relative_to(ROOT).parts[:-level], module]))
+                graph[importing] |= {f"{base}.{name}", base} & modules.keys()
+    return graph
+
+
+def folder_of(module: str) -> str:
+    """The folder a module stands in; what stands at a package's root is a room of its own."""
+    return module.rpartition(".")[0] if module.count(".") > 1 else module
+
+
+def test_no_circles_of_files() -> None:
+    graph = known_by()
+    assert sum(map(len, graph.values())) > 500
+    TopologicalSorter(graph).prepare()
+
+
+def test_no_circles_of_folders() -> None:
+    folders: dict[str, set[str]] = {}
+    for module, known in known_by().items():
+        folders.setdefault(folder_of(module), set()).update(folder_of(other) for other in known)
+    TopologicalSorter({folder: known - {folder} for folder, known in folders.items()}).prepare()
+
+
 def test_rare_libraries_are_known_to_one_module() -> None:
     for library in ONE_MODULE_ONLY:
         users = {
@@ -96,11 +134,7 @@ def test_module(path: Path) -> None:
     tree = TREES[path]
     assert ast.get_docstring(tree), f"{path}: no docstring"
     assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
-    assigned = {
-        getattr(target, "id", "")
-        for node in tree.body
-        for target in getattr(node, "targets", [getattr(node, "target", None)])
-    }
+    assigned = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     assert "__all__" in assigned or path == ROOT / "dotwave" / "__init__.py", f"{path}: no __all__"
 
 

@@ -7,12 +7,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from encoders import Choice, GridShape, TargetPattern, choose_distinct, distinctness, felt_codes, plane_wave, weakened
-from encoders.distinct import EQUAL, NEAR
+from encoders.sets import EQUAL, NEAR
 
 code_sets = st.integers(1, 9).flatmap(
     lambda count: arrays(np.uint8, (count, 70), elements=st.sampled_from([0, 0, 0, 1, 3, 97]))

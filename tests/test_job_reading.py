@@ -10,8 +10,7 @@ import yaml
 
 from chainsim import ProfileError, load_device
 from dotwave.job import Job, job_schema, read_job
-from encoders import GridShape, plane_wave, regions
-from encoders import Region as TextureRegion
+from encoders import GridShape, Region as TextureRegion, plane_wave, regions
 
 JOBS = sorted((Path(__file__).resolve().parent.parent / "samples" / "jobs").glob("*.yaml"))
 

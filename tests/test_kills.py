@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from drivers import read_waveform
-from drivers.parts import part_of
+from drivers.files.parts import part_of
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs kill")
 

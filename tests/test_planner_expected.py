@@ -23,8 +23,7 @@ from planner.outlook import FrameSpread
 from planner.robustness import expected as expected_module
 from planner.robustness.expected import WANTED, Expectation
 from planner.robustness.robust_aim import aim_for
-from planner.robustness.robust_search import Held as Settings
-from planner.robustness.robust_search import Search, Trial
+from planner.robustness.robust_search import Held as Settings, Search, Trial
 from planner.robustness.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
 from planner.waves.walking import walking_state
 from planner.wish import ChainWish

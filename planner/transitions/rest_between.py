@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from chainsim import Device, GridIntegrator
 
 from ..plan import ChainState, Ramp
-from .check import SAMPLES_PER_PERIOD as SAMPLES
-from .check import Orbit
+from .check import SAMPLES_PER_PERIOD as SAMPLES, Orbit
 from .rise import orbit_of
 from .steering import Standing
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, GridIntegrator, Setting, load_device
-from chainsim.continuation.path import Path as Branch
-from chainsim.continuation.path import continue_branch
+from chainsim.continuation.path import Path as Branch, continue_branch
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
 

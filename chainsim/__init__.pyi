@@ -1,0 +1,140 @@
+from .averaging.decide import (
+    Decision as Decision,
+    decide as decide,
+)
+from .averaging.envelope import (
+    follow as follow,
+)
+from .batch.sweep import (
+    SweepResult as SweepResult,
+    sweep as sweep,
+    unit_of as unit_of,
+)
+from .complaints import (
+    complaint_of as complaint_of,
+    shown as shown,
+    words_of as words_of,
+)
+from .continuation.path import (
+    continue_branch as continue_branch,
+)
+from .continuation.spectrum import (
+    critical_lam as critical_lam,
+    delta_from_critical_lam as delta_from_critical_lam,
+    gain_per_stage as gain_per_stage,
+    peak_gain as peak_gain,
+    rest_eigenvalues as rest_eigenvalues,
+    spectrum_curve as spectrum_curve,
+)
+from .effects.effects import (
+    AmplifierDynamics as AmplifierDynamics,
+    BoucWen as BoucWen,
+    Creep as Creep,
+    Mode as Mode,
+    Play as Play,
+    Terms as Terms,
+    Tone as Tone,
+    bending_modes as bending_modes,
+    modulated as modulated,
+)
+from .effects.ode import (
+    integrate_terms as integrate_terms,
+)
+from .effects.rungs import (
+    solve_with_terms as solve_with_terms,
+)
+from .effects.steady import (
+    Steady as Steady,
+    steady_with_terms as steady_with_terms,
+)
+from .effects.tones import (
+    two_tones as two_tones,
+)
+from .equations.chain import (
+    Chain as Chain,
+    Setting as Setting,
+    Spread as Spread,
+)
+from .equations.coupling import (
+    Closure as Closure,
+    CouplingKind as CouplingKind,
+)
+from .errors import (
+    ChainError as ChainError,
+    ProfileError as ProfileError,
+)
+from .files.simulation import (
+    Simulation as Simulation,
+    parse_simulation as parse_simulation,
+    read_simulation as read_simulation,
+    simulate as simulate,
+)
+from .files.sweep import (
+    SettingSweep as SettingSweep,
+    read_sweep as read_sweep,
+)
+from .harmonic_balance.joint_branches import (
+    Branches as Branches,
+    joint_branches as joint_branches,
+)
+from .harmonic_balance.rung import (
+    balance_near as balance_near,
+)
+from .harmonic_balance.sensitivity import (
+    Gradient as Gradient,
+    gradient as gradient,
+)
+from .model.calibrated import (
+    Actuator as Actuator,
+    ActuatorSpread as ActuatorSpread,
+)
+from .model.device import (
+    Amplifier as Amplifier,
+    Coupling as Coupling,
+    Device as Device,
+    Note as Note,
+    Span as Span,
+    device_names as device_names,
+    load_device as load_device,
+)
+from .model.response import (
+    Branch as Branch,
+    Outcome as Outcome,
+    Response as Response,
+    Stats as Stats,
+)
+from .npy_header import (
+    NpyHeader as NpyHeader,
+    read_npy_header as read_npy_header,
+)
+from .reach.ladder import (
+    solve as solve,
+)
+from .rung import (
+    RUNGS as RUNGS,
+    TERMS as TERMS,
+    Rung as Rung,
+    RungError as RungError,
+    Start as Start,
+    load_rung as load_rung,
+)
+from .time_domain.as_built import (
+    AsBuilt as AsBuilt,
+)
+from .time_domain.integrate import (
+    Escape as Escape,
+    GridError as GridError,
+    GridIntegrator as GridIntegrator,
+)
+from .time_domain.ode import (
+    Reached as Reached,
+    reached_from_rest as reached_from_rest,
+    steady_from_ramp as steady_from_ramp,
+    steady_from_rest as steady_from_rest,
+)
+from .yamlfile import (
+    Located as Located,
+    parse_model as parse_model,
+    read_located as read_located,
+    read_model as read_model,
+)

@@ -1,0 +1,147 @@
+from .channels import (
+    Channel as Channel,
+    Role as Role,
+    channels_of as channels_of,
+)
+from .errors import (
+    DriverError as DriverError,
+    FileError as FileError,
+    LimitError as LimitError,
+    UnreadableWaveform as UnreadableWaveform,
+    WaveformError as WaveformError,
+)
+from .exchange.file import (
+    read_exchange as read_exchange,
+    write_exchange as write_exchange,
+)
+from .files.locks import (
+    held as held,
+)
+from .files.parts import (
+    Part as Part,
+    is_at as is_at,
+    part_of as part_of,
+)
+from .files.whole import (
+    atomic_file as atomic_file,
+    atomic_files as atomic_files,
+    made_folder as made_folder,
+    naming as naming,
+    settled as settled,
+)
+from .formats.samples import (
+    EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
+    SUFFIXES as SUFFIXES,
+    SampleReader as SampleReader,
+    SampleWriter as SampleWriter,
+)
+from .formats.wav import (
+    Encoding as Encoding,
+    WavWriter as WavWriter,
+)
+from .formats.wav_reader import (
+    WavReader as WavReader,
+)
+from .protocol.emulator import (
+    Emulator as Emulator,
+    EmulatorStatus as EmulatorStatus,
+)
+from .protocol.faults import (
+    Faults as Faults,
+    FaultyLine as FaultyLine,
+    Window as Window,
+)
+from .protocol.felt import (
+    FeltGrid as FeltGrid,
+)
+from .protocol.host_session import (
+    ControllerRefused as ControllerRefused,
+    HostSession as HostSession,
+    SessionLost as SessionLost,
+    StreamReport as StreamReport,
+    Timing as Timing,
+)
+from .protocol.messages import (
+    Ack as Ack,
+    Capabilities as Capabilities,
+)
+from .protocol.outgoing import (
+    UnfitController as UnfitController,
+    session_messages as session_messages,
+)
+from .protocol.packet import (
+    Kind as Kind,
+    Packet as Packet,
+    PacketReader as PacketReader,
+)
+from .protocol.playout import (
+    BUFFER_S as BUFFER_S,
+    ControllerSpec as ControllerSpec,
+)
+from .protocol.pty_line import (
+    PtyUnavailable as PtyUnavailable,
+)
+from .protocol.record import (
+    ArrivalRecorder as ArrivalRecorder,
+)
+from .protocol.virtual_controller import (
+    VirtualController as VirtualController,
+)
+from .safety import (
+    GateLimits as GateLimits,
+    GateRefusal as GateRefusal,
+    GateReport as GateReport,
+    pass_gate as pass_gate,
+)
+from .sinks.audio import (
+    AudioError as AudioError,
+    AudioUnavailable as AudioUnavailable,
+    parse_outputs as parse_outputs,
+    play_audio as play_audio,
+)
+from .sinks.board_serial import (
+    BOARD_BAUD as BOARD_BAUD,
+    BoardEmulator as BoardEmulator,
+    Firmware as Firmware,
+    grid_line as grid_line,
+    play_grid_lines as play_grid_lines,
+)
+from .sinks.drv2667 import (
+    BoardRefusal as BoardRefusal,
+)
+from .sinks.serial_play import (
+    NoAnswer as NoAnswer,
+    run_session as run_session,
+)
+from .sinks.tactile_board import (
+    BoardPlan as BoardPlan,
+    plan_board as plan_board,
+)
+from .sinks.uart import (
+    LinkLost as LinkLost,
+    PortUnavailable as PortUnavailable,
+    SerialMissing as SerialMissing,
+    Uart as Uart,
+    serial_ports as serial_ports,
+)
+from .waveform.coupling import (
+    CouplingEvent as CouplingEvent,
+)
+from .waveform.file import (
+    WrittenWaveform as WrittenWaveform,
+    read_waveform as read_waveform,
+    write_waveform as write_waveform,
+)
+from .waveform.limits import (
+    LimitCheck as LimitCheck,
+)
+from .waveform.manifest import (
+    FrameMark as FrameMark,
+    Manifest as Manifest,
+)
+from .waveform.manifest_reader import (
+    read_manifest as read_manifest,
+)
+from .waveform.sampling import (
+    Waveform as Waveform,
+)

@@ -1,0 +1,3 @@
+"""Vibrations for displays of others: HJIF, AHAP and Meta's .haptic, written and read."""
+
+__all__: list[str] = []

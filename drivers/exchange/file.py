@@ -1,0 +1,79 @@
+"""Haptic exchange files: MPEG HJIF for the whole grid, Apple AHAP and Meta .haptic for one actuator or the mean.
+
+Sources: ISO/IEC 23090-31 (HJIF, as MPEG's reference software reads it), Apple's AHAP schema (version 1.0),
+Meta's .haptic 1.0. Each keeps levels and their times to a millisecond; only HJIF keeps the grid and the phase.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from planner import Plan
+
+from ..errors import FileError, UnreadableWaveform
+from ..files.whole import atomic_file, naming
+from ..formats.samples import EXCHANGE_SUFFIXES
+from .ahap import read_ahap, to_ahap
+from .curves import HapticCurves, haptic_curves
+from .haptic import read_meta, to_meta
+from .hjif import read_hjif, to_hjif
+
+__all__ = ["read_exchange", "write_exchange"]
+
+
+def write_exchange(plan: Plan, path: Path | str, *, actuator: tuple[int, int] | None = None) -> None:
+    """Write `plan` as the haptic file that the ending of `path` names.
+
+    Parameters
+    ----------
+    actuator : (row, col) for .ahap and .haptic; None is the mean over the grid. HJIF takes the whole grid.
+
+    Raises
+    ------
+    WaveformError
+        When the plan holds patterns still, or the grid has no such actuator.
+    FileError
+        When the ending is none of these, or the file system refuses.
+    """
+    path = Path(path)
+    suffix = _suffix(path)
+    curves = haptic_curves(plan)
+    single = to_ahap if suffix == ".ahap" else to_meta
+    content = to_hjif(curves, plan) if suffix == ".hjif" else single(curves.of(actuator))
+    text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+    with atomic_file(path) as file, naming(path):
+        file.write(text.encode())
+
+
+def read_exchange(path: Path | str) -> HapticCurves:
+    """Check a haptic file against the rules of its format and give its curves back.
+
+    Raises
+    ------
+    FileError
+        When it cannot be read, or its ending is none of these.
+    UnreadableWaveform
+        With the rule it breaks, and where.
+    """
+    path = Path(path)
+    reader: Callable[[Any], HapticCurves] = {".hjif": read_hjif, ".ahap": read_ahap, ".haptic": read_meta}[
+        _suffix(path)
+    ]
+    with naming(path):
+        raw = path.read_bytes()
+    try:
+        return reader(json.loads(raw))
+    except KeyError as error:
+        raise UnreadableWaveform(f"{path}: the key {error} is missing") from None
+    except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
+        raise UnreadableWaveform(f"{path}: {error}") from None
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in EXCHANGE_SUFFIXES:
+        raise FileError(f"{path}: expected a name that ends in {', '.join(EXCHANGE_SUFFIXES)}")
+    return suffix

@@ -1,0 +1,3 @@
+"""A plan as samples, and the manifest beside them."""
+
+__all__: list[str] = []

@@ -1,0 +1,299 @@
+"""The manifest beside the samples: enough to rebuild the experiment. Its contents, and writing it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Closure, Device, Outcome
+from planner import ChainState, FramePlan
+
+from ..channels import Channel, channels_of
+from ..errors import UnreadableWaveform, WaveformError
+from ..files.whole import naming
+from .coupling import CouplingEvent, CouplingWriter, LamTrack
+
+__all__ = ["SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open"]
+
+Floats = NDArray[np.float64]
+
+SCHEMA = "dotwave/waveform/1"
+DIGITS = 12  # significant digits of a target in the file
+ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
+
+
+@dataclass(frozen=True)
+class FrameMark:
+    """One frame as the manifest has it.
+
+    Attributes
+    ----------
+    start_s, settled_s, end_s : the pattern stands from settled_s to end_s.
+    omega : float64, shape (rows,), read-only, each row's drive frequency over f0.
+    tones : further frequencies over f0 at which each row is to move as much; mostly none.
+    phase : float64, shape (rows, cols), read-only, wanted phases in radians, NaN where any will do; those of rows
+        with one omega may all be shifted alike.
+    moving : for each row whether its target is an amplitude at omega; else it is a deflection.
+    target : float64, shape (rows, cols), read-only, amplitude in units of full scale.
+    cells, text : what is shown, as Unicode Braille and as source text. outcome : how planning it went.
+    page : frames of one page are superposed by the reader. span : (start, end) of `text` in the source.
+    """
+
+    start_s: float
+    settled_s: float
+    end_s: float
+    omega: Floats
+    target: Floats
+    cells: str
+    text: str
+    outcome: Outcome
+    page: int
+    span: tuple[int, int]
+    tones: tuple[tuple[float, ...], ...]
+    phase: Floats
+    moving: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a written waveform says about itself; times in seconds from the first sample.
+
+    Attributes
+    ----------
+    samples_file : name of the file of samples, in the same folder. samples : its length per channel.
+    digest : "sha256:" and the hash of that file's bytes.
+    coupling : events by time within each row. frames : in order of time. encoding : from the scene.
+    """
+
+    samples_file: str
+    rate_hz: int
+    samples: int
+    digest: str
+    device: Device
+    channels: tuple[Channel, ...]
+    coupling: tuple[CouplingEvent, ...]
+    frames: tuple[FrameMark, ...]
+    encoding: Mapping[str, Any]
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the waveform in seconds."""
+        return self.samples / self.rate_hz
+
+    @cached_property
+    def _lam(self) -> LamTrack:
+        return LamTrack(self.coupling, self.device.rows, self.device.cols)
+
+    def lam_at(self, times_s: Floats) -> Floats:
+        """Links at a block of times (float64, shape (S,), seconds); memory is that of the answer.
+
+        Returns
+        -------
+        float64, shape (S, rows, cols); ``[:, r, m]`` couples actuator m-1 of row r into m. A chain's first is 0,
+        or where chains are rings, whose closing link is set with the first, that of its second.
+        """
+        lam = self._lam.at(times_s)
+        if self.device.coupling.closure is Closure.RING and self.device.chain_length > 1:
+            lam[:, :, :: self.device.chain_length] = lam[:, :, 1 :: self.device.chain_length]
+        return lam
+
+    def check_digest(self, path: Path) -> None:
+        """Compare the bytes of the samples file at `path` with `digest`.
+
+        Raises
+        ------
+        FileError
+            When the file cannot be read.
+        UnreadableWaveform
+            When it is not the file this manifest was written for.
+        """
+        found = digest_of(path)
+        if found != self.digest:
+            raise UnreadableWaveform(
+                f"{path}: its digest is {found}, the manifest says {self.digest}; one of the two files was changed"
+            )
+
+
+def digest_of(path: Path) -> str:
+    """The hash of a file's bytes as a manifest has it, "sha256:" in front.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read.
+    """
+    with naming(path), path.open("rb") as file:
+        return digest_of_open(file)
+
+
+def digest_of_open(file: BinaryIO) -> str:
+    """The same of a file that is open for reading; it is left at its end.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    """
+    file.seek(0)
+    digest = hashlib.sha256()
+    for piece in iter(lambda: file.read(1 << 20), b""):
+        digest.update(piece)
+    return f"sha256:{digest.hexdigest()}"
+
+
+class ManifestWriter:
+    """Takes the frames as they are sampled and writes the manifest at the end.
+
+    Frames and coupling events wait in nameless files in the folder of `path`, so that memory does not grow
+    with them. Use it in a `with` statement.
+
+    Parameters
+    ----------
+    device : the hardware. path : where the manifest will be, for messages.
+    """
+
+    def __init__(self, device: Device, path: Path) -> None:
+        self._device = device
+        self._path = path
+        self._coupling = CouplingWriter(device)
+        self.frames = 0
+
+    def __enter__(self) -> ManifestWriter:
+        with naming(self._path), ExitStack() as stack:
+            self._events = _Spool(stack.enter_context(tempfile.TemporaryFile(dir=self._path.parent)))
+            self._marks = _Spool(stack.enter_context(tempfile.TemporaryFile(dir=self._path.parent)))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # Closing flushes; a full disk has had its say by now, and what waits here is wanted no more.
+        with suppress(OSError):
+            self._stack.close()
+
+    def add(self, frame: FramePlan) -> None:
+        """Take the next frame (checked by `stretches`); the way out after the last frame makes no mark.
+
+        Raises
+        ------
+        WaveformError
+            When the driven chains of a row differ in omega, which a manifest cannot say.
+        FileError
+            When the disk is full.
+        """
+        with naming(self._path):
+            for event in self._coupling.events(frame):
+                self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
+            if frame.frame is not None:
+                self._marks.add(_mark(self._device, frame, self.frames))
+                self.frames += 1
+
+    def write(self, out: BinaryIO, samples_file: str, samples: int, digest: str, encoding: Mapping[str, Any]) -> None:
+        """Write the whole manifest to `out`.
+
+        Raises
+        ------
+        WaveformError
+            When `encoding` is not made of plain JSON values.
+        OSError
+            When the disk is full.
+        """
+        head = {
+            "schema": SCHEMA,
+            "samples_file": samples_file,
+            "rate_hz": self._device.amplifier.rate_hz,
+            "samples": samples,
+            "digest": digest,
+            "device": self._device.as_dict(),
+            "channels": [channel.as_dict() for channel in channels_of(self._device)],
+        }
+        for key, value in head.items():
+            out.write((b"{" if key == "schema" else b",") + b"\n" + _json(key) + b": " + _json(value))
+        for key, spool in (("coupling", self._events), ("frames", self._marks)):
+            out.write(b",\n" + _json(key) + b": [")
+            spool.copy_to(out)
+            out.write(b"]")
+        try:
+            out.write(b",\n" + _json("encoding") + b": " + _json(dict(encoding)))
+        except (TypeError, ValueError) as error:
+            raise WaveformError(f"plan.encoding: {error}; only plain JSON values can be written") from None
+        out.write(b"\n}\n")
+
+
+class _Spool:
+    """JSON items on lines, in a temporary file."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._empty = True
+
+    def add(self, item: dict[str, Any]) -> None:
+        self._file.write((b"\n" if self._empty else b",\n") + _json(item))
+        self._empty = False
+
+    def copy_to(self, out: BinaryIO) -> None:
+        self._file.seek(0)
+        shutil.copyfileobj(self._file, out)
+
+
+def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
+    assert frame.frame is not None
+    per_row = device.chains_per_row
+    rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
+    mark = {
+        "start_s": frame.start_s,
+        "settled_s": frame.settled_s,
+        "end_s": frame.end_s,
+        "omega": [_common_omega(row, f"frame {number}, row {index}") for index, row in enumerate(rows)],
+        "target": [[_rounded(v) for state in row for v in state.target.tolist()] for row in rows],
+        "cells": frame.frame.cells,
+        "text": frame.frame.text,
+        "outcome": frame.outcome.value,
+        "page": frame.frame.page,
+        "span": list(frame.frame.span),
+    }
+    if any(state.tones for state in frame.states):
+        mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
+    if any(state.phase is not None for state in frame.states):
+        mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]
+    moving = [any(state.moving for state in row) for row in rows]
+    if device.bias == "actuator" and any(moving):
+        for index, row in enumerate(rows):
+            if moving[index] and any(np.any(state.bias) for state in row):
+                raise WaveformError(f"frame {number}, row {index}: some of its chains vibrate and some stand still")
+        mark["moving"] = moving
+    if frame.spread is not None:
+        mark["spread"] = frame.spread.as_dict()
+    return mark
+
+
+def _phases(state: ChainState) -> list[float | None]:
+    if state.phase is None:
+        return [None] * len(state.target)
+    return [None if np.isnan(phase) else _rounded(phase) for phase in state.phase.tolist()]
+
+
+def _common_omega(states: tuple[ChainState, ...], place: str) -> float:
+    driven = {state.omega for state in states if state.epsilon} or {states[0].omega}
+    if len(driven) > 1:
+        raise WaveformError(f"{place}: its chains are driven at omega {sorted(driven)}; plan one omega for a row")
+    return float(driven.pop())
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _json(value: object) -> bytes:
+    # Half of a surrogate pair has no UTF-8; \udXXX is also how JSON writes it.
+    return ENCODER.encode(value).encode("utf-8", "backslashreplace")

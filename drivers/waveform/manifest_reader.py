@@ -1,0 +1,237 @@
+"""Reading a manifest: every complaint names the file and the field."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from chainsim import Device, Outcome, complaint_of, shown, words_of
+
+from ..channels import Channel, Role
+from ..errors import UnreadableWaveform
+from ..files.whole import naming
+from ..formats.samples import SUFFIXES
+from .coupling import CouplingEvent
+from .manifest import FrameMark, Manifest
+
+__all__ = ["read_manifest"]
+
+# As many as an amplifier has; as many as a file of 64 bits can hold.
+MOST_HZ = 10_000_000
+MOST_SAMPLES = 1 << 60
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# A length to hold to also makes sure that it is text which can be written: JSON can name half a character.
+Words = Annotated[str, Field(max_length=1_000_000)]
+Index = Annotated[int, Field(ge=0)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+
+class _Channel(_Part):
+    index: Index
+    role: Annotated[Role, Field(strict=False)]
+    row: Index
+    col: Index | None = None
+    volts_per_unit: Positive
+
+
+class _Event(_Part):
+    t_s: Seconds
+    row: Index
+    lam: list[Finite]
+    ramp_s: Seconds
+
+
+class _Frame(_Part):
+    start_s: Seconds
+    settled_s: Seconds
+    end_s: Seconds
+    omega: list[Positive]
+    target: list[list[Finite]]
+    cells: Words = ""
+    text: Words = ""
+    outcome: Annotated[Outcome, Field(strict=False)]
+    page: Index = 0
+    span: Annotated[list[Index], Field(min_length=2, max_length=2)] = [0, 0]
+    tones: list[list[Positive]] | None = None
+    phase: list[list[Finite | None]] | None = None
+    moving: list[bool] | None = None
+
+
+class _File(_Part):
+    schema_: Literal["dotwave/waveform/1"] = Field(alias="schema")
+    samples_file: Annotated[Words, Field(min_length=1)]
+    rate_hz: Annotated[int, Field(ge=1, le=MOST_HZ)]
+    samples: Annotated[int, Field(ge=0, le=MOST_SAMPLES)]
+    digest: Annotated[str, Field(pattern="^sha256:[0-9a-f]{64}$")]
+    device: Device
+    channels: Annotated[list[_Channel], Field(min_length=1)]
+    coupling: list[_Event]
+    frames: list[_Frame]
+    encoding: dict[str, Any] = {}
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read and check the manifest at `path`. Keys it does not know are passed over.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read.
+    UnreadableWaveform
+        When it is not JSON, or a field is missing, of another type, or contradicts the device; the message
+        is one line such as ``hello.json: frames[3].target: expected 6 rows of 6 numbers``.
+    """
+    with naming(path):
+        raw = path.read_bytes()
+    try:
+        data = json.loads(raw, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise UnreadableWaveform(f"{path}: not JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise UnreadableWaveform(f"{path}: not a manifest: expected an object with a schema")
+    try:
+        file = _File.model_validate(data)
+    except ValidationError as error:
+        first = complaint_of(error)
+        raise UnreadableWaveform(f"{path}: {_place(first.place)}: {first.sentence}") from None
+    _Check(path, file.device).all(file)
+    return _manifest(file)
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number in JSON")
+
+
+def _place(parts: tuple[str | int, ...]) -> str:
+    words = (f"[{part}]" if isinstance(part, int) else f".{words_of((part,))}" for part in parts)
+    return "".join(words).removeprefix(".") or "file"
+
+
+class _Check:
+    """What a type cannot say: sizes, order and agreement with the device."""
+
+    def __init__(self, path: Path, device: Device) -> None:
+        self._path = path
+        self._device = device
+
+    def all(self, file: _File) -> None:
+        if Path(file.samples_file).name != file.samples_file or "\0" in file.samples_file:
+            self._refuse("samples_file", f"expected a name without folders, got {shown(file.samples_file)}")
+        if Path(file.samples_file).suffix.lower() not in SUFFIXES:
+            wanted = f"a name that ends in {', '.join(SUFFIXES)}"
+            self._refuse("samples_file", f"expected {wanted}, got {shown(file.samples_file)}")
+        self._channels(file.channels)
+        last = [0.0] * self._device.rows
+        for index, event in enumerate(file.coupling):
+            self._event(f"coupling[{index}]", event, last)
+        end_s = 0.0
+        for index, frame in enumerate(file.frames):
+            # Frames join on a sample; their times in seconds may overlap by a rounding.
+            if round(frame.start_s * file.rate_hz) < round(end_s * file.rate_hz):
+                self._refuse(
+                    f"frames[{index}].start_s", f"{frame.start_s} s is before the frame ahead ends, at {end_s} s"
+                )
+            self._frame(f"frames[{index}]", frame)
+            end_s = frame.end_s
+        if end_s * file.rate_hz > file.samples + 1:
+            self._refuse(f"frames[{len(file.frames) - 1}].end_s", f"{end_s} s is after the last of the samples")
+
+    def _channels(self, channels: list[_Channel]) -> None:
+        driven: set[tuple[Role, int, int]] = set()
+        for index, channel in enumerate(channels):
+            place = f"channels[{index}]"
+            if channel.index != index:
+                self._refuse(f"{place}.index", f"expected {index}, got {channel.index}")
+            self._row(place, channel.row)
+            if (channel.col or 0) >= self._device.cols:
+                self._refuse(f"{place}.col", f"expected 0 to {self._device.cols - 1}, got {channel.col}")
+            if channel.role is Role.BIAS and channel.col is None:
+                self._refuse(f"{place}.col", "a bias channel needs a col")
+            if channel.role is Role.DRIVE and (channel.col or 0) % self._device.chain_length:
+                self._refuse(f"{place}.col", f"no chain begins at col {channel.col}")
+            target = (channel.role, channel.row, channel.col or 0)
+            if target in driven:
+                self._refuse(place, "a second channel for the same actuator and role")
+            driven.add(target)
+
+    def _event(self, place: str, event: _Event, last: list[float]) -> None:
+        self._row(place, event.row)
+        if len(event.lam) != self._device.cols - 1:
+            self._refuse(f"{place}.lam", f"expected {self._device.cols - 1} numbers, got {len(event.lam)}")
+        if event.t_s < last[event.row]:
+            self._refuse(f"{place}.t_s", f"{event.t_s} s is before the event ahead of it, at {last[event.row]} s")
+        last[event.row] = event.t_s
+
+    def _frame(self, place: str, frame: _Frame) -> None:
+        rows, cols = self._device.rows, self._device.cols
+        if len(frame.omega) != rows:
+            self._refuse(f"{place}.omega", f"expected {rows} numbers, one for each row, got {len(frame.omega)}")
+        if len(frame.target) != rows or any(len(row) != cols for row in frame.target):
+            self._refuse(f"{place}.target", f"expected {rows} rows of {cols} numbers")
+        for name, value in (("tones", frame.tones), ("moving", frame.moving)):
+            if value is not None and len(value) != rows:
+                self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
+        phase = frame.phase
+        if phase is not None and (len(phase) != rows or any(len(row) != cols for row in phase)):
+            self._refuse(f"{place}.phase", f"expected {rows} rows of {cols} numbers or null")
+        if not frame.start_s <= frame.settled_s <= frame.end_s:
+            times = f"start_s {frame.start_s}, settled_s {frame.settled_s}, end_s {frame.end_s}"
+            self._refuse(place, f"{times} are not in order")
+
+    def _row(self, place: str, row: int) -> None:
+        if row >= self._device.rows:
+            self._refuse(f"{place}.row", f"expected 0 to {self._device.rows - 1}, got {row}")
+
+    def _refuse(self, place: str, why: str) -> NoReturn:
+        raise UnreadableWaveform(f"{self._path}: {place}: {why}")
+
+
+def _manifest(file: _File) -> Manifest:
+    return Manifest(
+        samples_file=file.samples_file,
+        rate_hz=file.rate_hz,
+        samples=file.samples,
+        digest=file.digest,
+        device=file.device,
+        channels=tuple(Channel(c.index, c.role, c.row, c.col, c.volts_per_unit) for c in file.channels),
+        coupling=tuple(CouplingEvent(e.t_s, e.row, tuple(e.lam), e.ramp_s) for e in file.coupling),
+        frames=tuple(_mark(frame, file.device) for frame in file.frames),
+        encoding=file.encoding,
+    )
+
+
+def _mark(frame: _Frame, device: Device) -> FrameMark:
+    any_phase = [[None] * device.cols] * device.rows
+    phase = [[math.nan if one is None else one for one in row] for row in frame.phase or any_phase]
+    return FrameMark(
+        start_s=frame.start_s,
+        settled_s=frame.settled_s,
+        end_s=frame.end_s,
+        omega=_frozen(frame.omega),
+        target=_frozen(frame.target),
+        cells=frame.cells,
+        text=frame.text,
+        outcome=frame.outcome,
+        page=frame.page,
+        span=(frame.span[0], frame.span[1]),
+        tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
+        phase=_frozen(phase),
+        moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
+    )
+
+
+def _frozen(values: ArrayLike) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,211 @@
+"""Volts per channel as a function of time, sampled in blocks at the very end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device
+from planner import ChainState, FramePlan, Plan, Ramp
+
+from ..channels import Channel, Role, channels_of
+from .curve import curve
+from .hold import hold_inverse
+from .shaping import Shaper
+from .timeline import Stretch, stretches
+
+__all__ = ["Waveform"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Samples of all channels computed at once: about a megabyte of float64, which stays in the cache.
+CHUNK_VALUES = 1 << 17
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """The amplifier voltages that carry out a plan.
+
+    The drive of a chain is ``Re(E(t) e^{i omega tau}) / epsilon_per_volt`` volts, summed over its tones,
+    tau = 2 pi f0_hz t, with E the ramp's envelope while it lasts and the state's epsilon after it; the bias of an
+    actuator is ``b(t) / bias_per_volt``. The time of sample k is k / rate_hz, counted from the start of the plan.
+    Where the converter has steps, drives are rounded to them with the error pushed up in frequency (`Shaper`), constant
+    voltages to the nearest.
+
+    Attributes
+    ----------
+    device : the hardware. channels : what each column of a block is.
+    frames : the plan's frames; they are drawn as the samples are asked for.
+    """
+
+    device: Device
+    channels: tuple[Channel, ...]
+    frames: Iterable[FramePlan]
+
+    @classmethod
+    def of(cls, plan: Plan) -> Waveform:
+        """The waveform of `plan`; nothing is computed yet."""
+        return cls(plan.device, channels_of(plan.device), plan.frames)
+
+    @property
+    def rate_hz(self) -> int:
+        """Samples per second and channel."""
+        return self.device.amplifier.rate_hz
+
+    def blocks(self, block: int) -> Iterator[Floats]:
+        """The samples from the start, `block` at a time; the last block may be shorter.
+
+        The values do not depend on `block`, to the last bit. Memory is that of one block and one chunk,
+        however long the plan or a frame.
+
+        Yields
+        ------
+        float64, shape (S, channels), volts, read-only.
+
+        Raises
+        ------
+        ValueError
+            When block < 1.
+        WaveformError
+            When a frame does not fit the device or the frame before it.
+        """
+        if block < 1:
+            raise ValueError(f"block: expected a whole number >= 1, got {block}")
+        return self._reblocked(block)
+
+    def _reblocked(self, block: int) -> Iterator[Floats]:
+        # Channels are contiguous in memory: they are computed, filled and checked one by one.
+        pending, filled = np.empty((len(self.channels), block)), 0
+        for chunk in self._chunks():
+            taken = 0
+            while taken < chunk.shape[1]:
+                count = min(block - filled, chunk.shape[1] - taken)
+                pending[:, filled : filled + count] = chunk[:, taken : taken + count]
+                filled, taken = filled + count, taken + count
+                if filled == block:
+                    yield _finished(pending)
+                    pending, filled = np.empty((len(self.channels), block)), 0
+        if filled:
+            yield _finished(pending[:, :filled])
+
+    def _chunks(self) -> Iterator[Floats]:
+        # Chunks are cut at the same samples for every block size, so that vector instructions meet the same
+        # numbers at the same places and round them in the same way.
+        size = max(256, CHUNK_VALUES // len(self.channels))
+        drives = sum(channel.role is Role.DRIVE for channel in self.channels)
+        step, shaper = self.device.amplifier.volt_step, Shaper(drives)
+        for stretch in stretches(self.device, self.frames):
+            for first in range(stretch.first, stretch.stop, size):
+                chunk = self._chunk(stretch, np.arange(first, min(first + size, stretch.stop)))
+                if step:
+                    chunk /= step
+                    chunk[:drives] = shaper.round(chunk[:drives])
+                    np.rint(chunk[drives:], out=chunk[drives:])
+                    chunk *= step
+                yield chunk
+
+    def _chunk(self, stretch: Stretch, index: NDArray[np.intp]) -> Floats:
+        frame, device = stretch.plan, self.device
+        time_s = index / self.rate_hz
+        since_s = time_s - frame.start_s
+        out = np.zeros((len(self.channels), len(index)))
+        carriers: dict[float, _Carrier] = {}
+        equal: dict[tuple[int, int], int] = {}
+        for number, (state, ramp) in enumerate(zip(frame.states, frame.ramps, strict=True)):
+            # Equal rows come from the planner's cache as the same objects: sampled once, then copied.
+            first = equal.setdefault((id(state), id(ramp)), number)
+            if first < number:
+                out[number] = out[first]
+            else:
+                for tone in _tones(state, ramp):
+                    if tone.omega not in carriers:
+                        carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
+                    _drive(tone, ramp, since_s, carriers[tone.omega], out[number])
+        drives = out[: len(frame.states)]
+        drives /= device.epsilon_per_volt
+        if device.bias == "actuator":
+            biases = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
+            for state, ramp, rows in zip(frame.states, frame.ramps, biases, strict=True):
+                _bias(state, ramp, since_s, device.bias_per_volt, rows)
+        return out
+
+
+@dataclass(frozen=True)
+class _Carrier:
+    """cos and sin of omega tau at the samples of a chunk, float64, shape (S,), and what the hold takes away.
+
+    An envelope E is sampled as ``gain E + i lead_s E'``, E' per second (see `hold_inverse`).
+    """
+
+    cos: Floats
+    sin: Floats
+    gain: float
+    lead_s: float
+
+    @classmethod
+    def of(cls, omega: float, tau: Floats, device: Device) -> _Carrier:
+        gain, lead = hold_inverse(omega, device.tau_per_s / device.amplifier.rate_hz)
+        return cls(np.cos(omega * tau), np.sin(omega * tau), gain, lead / device.tau_per_s)
+
+
+def _ramp_samples(ramp: Ramp | None, since_s: Floats) -> int:
+    """How many of the sample times lie before the end of the ramp."""
+    return 0 if ramp is None else int(np.searchsorted(since_s, ramp.duration_s))
+
+
+class _DriveTone(NamedTuple):
+    """One tone of a drive: what it holds after the ramp, and its envelope during it."""
+
+    omega: float
+    held: complex
+    nodes: Complexes | None
+    slopes: Complexes | None
+
+
+def _tones(state: ChainState, ramp: Ramp | None) -> Iterator[_DriveTone]:
+    """The tones that sound, each frequency once."""
+    held = {state.omega: state.epsilon} | {tone.omega: tone.epsilon for tone in state.tones}
+    way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
+    if ramp is not None:
+        way = {state.omega: (ramp.epsilon, ramp.epsilon_slope)}
+        way |= {tone.omega: (tone.epsilon, tone.epsilon_slope) for tone in ramp.tones}
+    for omega in dict.fromkeys([*held, *way]):
+        tone = _DriveTone(omega, held.get(omega, 0j), *way.get(omega, (None, None)))
+        if tone.held or tone.nodes is not None:
+            yield tone
+
+
+def _drive(tone: _DriveTone, ramp: Ramp | None, since_s: Floats, carrier: _Carrier, out: Floats) -> None:
+    """Add one tone of the dimensionless drive force of one chain to `out`, shape (S,)."""
+    end = _ramp_samples(ramp, since_s)
+    if end and ramp is not None and tone.nodes is not None:
+        envelope = carrier.gain * curve(since_s[:end], ramp.t_s, tone.nodes, tone.slopes)
+        if tone.slopes is not None:
+            envelope += 1j * carrier.lead_s * np.interp(since_s[:end], ramp.t_s, tone.slopes)
+        out[:end] += envelope.real * carrier.cos[:end] - envelope.imag * carrier.sin[:end]
+    if tone.held and end < len(out):
+        held = carrier.gain * tone.held
+        out[end:] += held.real * carrier.cos[end:] - held.imag * carrier.sin[end:]
+
+
+def _bias(state: ChainState, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:
+    """Put the bias volts of one chain's actuators into `out`, shape (n, S), which is zero."""
+    end = _ramp_samples(ramp, since_s) if ramp is not None and ramp.bias is not None else 0
+    for actuator, row in enumerate(out):
+        if end and ramp is not None and ramp.bias is not None:
+            nodes = ramp.bias[:, actuator]
+            slopes = None if ramp.bias_slope is None else ramp.bias_slope[:, actuator]
+            still = np.all(nodes == nodes[0]) and (slopes is None or not np.any(slopes))
+            row[:end] = (nodes[0] if still else curve(since_s[:end], ramp.t_s, nodes, slopes)) / per_volt
+        if state.bias[actuator]:
+            row[end:] = state.bias[actuator] / per_volt
+
+
+def _finished(rows: Floats) -> Floats:
+    rows.flags.writeable = False
+    return rows.T

@@ -1,0 +1,115 @@
+from .braille.back_check import (
+    BackCheck as BackCheck,
+    Difference as Difference,
+    back_check as back_check,
+    back_translate as back_translate,
+    covered_text as covered_text,
+)
+from .braille.dots import (
+    bits_to_cell as bits_to_cell,
+    cell_to_bits as cell_to_bits,
+)
+from .braille.layout import (
+    join_pages as join_pages,
+)
+from .braille.louis_binding import (
+    liblouis_place as liblouis_place,
+    liblouis_version as liblouis_version,
+)
+from .braille.presentation import (
+    Presentation as Presentation,
+    read_cells as read_cells,
+)
+from .braille.readers.brf import (
+    brf_to_cells as brf_to_cells,
+    cells_to_brf as cells_to_brf,
+)
+from .braille.readers.sources import (
+    SourceKind as SourceKind,
+    TextSource as TextSource,
+)
+from .braille.report import (
+    EncodingReport as EncodingReport,
+    Split as Split,
+    UndefinedUse as UndefinedUse,
+)
+from .braille.tables import (
+    TableInfo as TableInfo,
+    foreign_tables as foreign_tables,
+    list_tables as list_tables,
+    resolve_tables as resolve_tables,
+)
+from .braille.text import (
+    TextFrames as TextFrames,
+    TextOptions as TextOptions,
+    TextScene as TextScene,
+    encode_text as encode_text,
+)
+from .braille.transcribe import (
+    Translation as Translation,
+    translate as translate,
+)
+from .braille.undefined import (
+    Undefined as Undefined,
+)
+from .errors import (
+    EmptyText as EmptyText,
+    EncodeError as EncodeError,
+    InvalidText as InvalidText,
+    LayoutError as LayoutError,
+    LouisMissing as LouisMissing,
+    TableMissing as TableMissing,
+    UndefinedCharacter as UndefinedCharacter,
+    UnsupportedSource as UnsupportedSource,
+)
+from .picture.errors import (
+    PictureError as PictureError,
+)
+from .picture.figure import (
+    Step as Step,
+)
+from .picture.options import (
+    Fit as Fit,
+    Invert as Invert,
+    Output as Output,
+    PictureOptions as PictureOptions,
+    RegionsBy as RegionsBy,
+    Style as Style,
+    Threshold as Threshold,
+)
+from .picture.pictures import (
+    PictureReport as PictureReport,
+    PictureScene as PictureScene,
+    encode_picture as encode_picture,
+    explain_picture as explain_picture,
+)
+from .picture.limits import PictureLimits as PictureLimits
+from .picture.similarity import (
+    similarities as similarities,
+)
+from .scene import (
+    Frame as Frame,
+    GridShape as GridShape,
+    PatternKind as PatternKind,
+    Scene as Scene,
+    TargetPattern as TargetPattern,
+    WalkingBars as WalkingBars,
+)
+from .sets import (
+    APART as APART,
+    Choice as Choice,
+    Distinctness as Distinctness,
+    choose_distinct as choose_distinct,
+    distinctness as distinctness,
+    felt_codes as felt_codes,
+    weakened as weakened,
+)
+from .textures import (
+    Region as Region,
+    TextureError as TextureError,
+    bars as bars,
+    levels as levels,
+    plane_wave as plane_wave,
+    regions as regions,
+    walking_bars as walking_bars,
+)

@@ -1,0 +1,3 @@
+"""Text to frames of Braille cells, and back."""
+
+__all__: list[str] = []

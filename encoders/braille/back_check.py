@@ -1,0 +1,198 @@
+"""Does the Braille that is felt say the text again? Back-translation, and what it can be held to.
+
+Not every table can be undone: some are declared for one direction (contracted German), Chinese tables
+write sounds. So three things are looked at, and named apart in the answer.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import TableMissing
+from . import louis_binding
+from .alphabet import alphabet
+from .dots import BLANK, LOWER_SIX
+from .layout import join_pages
+from .readers.sources import SourceKind, TextSource
+from .report import KEPT, ReportLog
+from .transcribe import Transcriber, translate
+from .undefined import Undefined, writable
+
+__all__ = ["BackCheck", "Difference", "back_check", "back_translate", "covered_text"]
+
+PIECE = 2000
+"""Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
+LONGEST_WORD = 100_000
+REACH = 12
+"""Words looked ahead to find where two texts agree again."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Words of the source and what the back-translation has for them; one of them may be empty."""
+
+    source: str
+    back: str
+
+
+@dataclass(frozen=True)
+class BackCheck:
+    """What the felt cells say.
+
+    Attributes
+    ----------
+    text_equal : the back-translation is the text, apart from case, white space and curled or straight quotes.
+    again_equal : the back-translation, written in Braille, gives the same cells: it may differ in what the
+        table does not write (Chinese characters of one sound).
+    cells_equal : the joined cells are exactly what the table writes for the text.
+    back : the back-translated text.
+    differences : the first 100 between source and back-translation; `difference_total` counts all.
+    """
+
+    text_equal: bool
+    again_equal: bool
+    cells_equal: bool
+    back: str
+    differences: tuple[Difference, ...]
+    difference_total: int
+
+    @property
+    def ok(self) -> bool:
+        """The text comes back, or, where the table cannot bring it back, the cells are exactly its cells."""
+        return self.text_equal or self.cells_equal
+
+    @property
+    def sentence(self) -> str:
+        """One sentence for a report."""
+        if not self.ok:
+            return f"The cells are not those of the text ({self.difference_total} differences)."
+        if self.text_equal:
+            return "Back-translated, the cells give the text again."
+        same = "the same cells" if self.again_equal else "other cells, as this table cannot be undone"
+        return (
+            f"The cells are those of the text; the back-translation differs from it in {self.difference_total} places "
+            f"and written again gives {same}."
+        )
+
+
+def back_translate(tables: tuple[str, ...], cells: str) -> str:
+    """Text of Unicode Braille as the tables read it; line breaks are read as blanks.
+
+    Raises
+    ------
+    TableMissing
+        When the tables cannot be used.
+    """
+    flat = cells.replace("\n", BLANK)
+    parts = []
+    at = 0
+    try:
+        while at < len(flat):
+            cut = flat.find(BLANK, at + PIECE, at + LONGEST_WORD)
+            if cut < 0:
+                cut = at + LONGEST_WORD
+            parts.append(louis_binding.back_translate(tables, flat[at:cut]))
+            at = cut
+    except RuntimeError:
+        why = louis_binding.complaint() or "unknown reason"
+        raise TableMissing(f"table {','.join(tables)}: cannot translate back: {why}") from None
+    return "".join(parts)
+
+
+def back_check(pages: Iterable[str], text: str, encoding: Mapping[str, Any]) -> BackCheck:
+    """Compare what pages of felt cells say with `text`.
+
+    Parameters
+    ----------
+    pages : cells of each page, as `read_cells` gives them.
+    text : the source the pages show; for Braille sources the cells themselves.
+    encoding : of the scene.
+    """
+    joined = join_pages(pages, encoding)
+    tables, dots = tuple(encoding["tables"]), int(encoding["dots"])
+    transcriber = Transcriber(tables, Undefined(encoding["undefined"]), dots)
+    source = TextSource(text, SourceKind(encoding["kind"]), "text")
+    words = (word for a, b in transcriber.paragraphs(source) for word in transcriber.words(source, a, b, ReportLog()))
+    expected = _joined_cells(words)
+    if source.kind is SourceKind.BRAILLE:
+        same = joined == expected
+        found = () if same else tuple(_differences(expected.split(BLANK), joined.split(BLANK)))
+        return BackCheck(same, same, same, joined, found[:KEPT], len(found))
+    ready = writable(text, 0, alphabet(tables), transcriber.undefined, ReportLog()).text
+    back = back_translate(tables, joined)
+    found = tuple(_differences(_folded(ready).split(), _folded(back).split()))
+    text_equal = not found or "".join(_folded(ready).split()) == "".join(_folded(back).split())
+    return BackCheck(
+        text_equal=text_equal,
+        again_equal=text_equal or _squeezed(tables, back, dots) == joined.replace(BLANK, ""),
+        cells_equal=joined == expected,
+        back=back,
+        differences=() if text_equal else found[:KEPT],
+        difference_total=0 if text_equal else len(found),
+    )
+
+
+def _joined_cells(words: Iterable[Any]) -> str:
+    parts: list[str] = []
+    for word in words:
+        if not word.glued:
+            parts.append(BLANK)
+        parts.append(word.cells)
+    return "".join(parts[1:])
+
+
+_TYPOGRAPHY = str.maketrans({"‘": "'", "’": "'", "“": '"', "”": '"'})
+
+
+def _folded(text: str) -> str:
+    # Braille has one apostrophe and one pair of quotes; which of print's the table gives back is its choice.
+    return unicodedata.normalize("NFC", text).translate(_TYPOGRAPHY).casefold()
+
+
+def _squeezed(tables: tuple[str, ...], text: str, dots: int) -> str:
+    cells = "".join(translate(tables, text[at : at + PIECE]).cells for at in range(0, len(text), PIECE))
+    return (cells.translate(LOWER_SIX) if dots == 6 else cells).replace(BLANK, "")
+
+
+def _differences(source: list[str], back: list[str]) -> Iterator[Difference]:
+    """Where two lists of words part, in time linear in their length."""
+    i = j = 0
+    while i < len(source) or j < len(back):
+        if i < len(source) and j < len(back) and source[i] == back[j]:
+            i, j = i + 1, j + 1
+            continue
+        skip_i, skip_j = _resume(source[i : i + REACH + 2], back[j : j + REACH + 2])
+        yield Difference(" ".join(source[i : i + skip_i]), " ".join(back[j : j + skip_j]))
+        i, j = i + skip_i, j + skip_j
+
+
+def _resume(source: list[str], back: list[str]) -> tuple[int, int]:
+    """How many words of each to skip until they agree again (in two words, or at the end)."""
+    for total in range(1, 2 * REACH):
+        for a in range(max(0, total - len(back)), min(total, len(source)) + 1):
+            left, right = source[a : a + 2], back[total - a : total - a + 2]
+            if left and left == right:
+                return a, total - a
+    return max(1, min(len(source), REACH)) if source else 0, max(1, min(len(back), REACH)) if back else 0
+
+
+def covered_text(shown: Iterable[tuple[tuple[int, int], str]]) -> str:
+    """The source text of frames, joined: overlapping spans count once, a gap is one blank.
+
+    Parameters
+    ----------
+    shown : span and text of each frame, in order, as in `Frame`.
+    """
+    parts: list[str] = []
+    reached = -1
+    for (start, end), text in shown:
+        if end <= reached or not text:
+            continue
+        if reached >= 0 and start > reached:
+            parts.append(" ")
+        parts.append(text[max(0, reached - start) :])
+        reached = end
+    return "".join(parts)

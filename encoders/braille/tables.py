@@ -1,0 +1,205 @@
+"""Which translation tables there are, and which one a person means."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+
+from ..errors import TableMissing
+from . import louis_binding
+
+__all__ = ["TableInfo", "foreign_tables", "hyphenation_tables", "list_tables", "resolve_tables", "table_dots"]
+
+
+@dataclass(frozen=True)
+class TableInfo:
+    """One table, from liblouis's own metadata; a field it does not state is empty (`dots`: 0).
+
+    Attributes
+    ----------
+    file : name of the table file.
+    language : BCP 47 tag. grade : contraction grade. name : what to show to a person.
+    contraction : ``full``, ``partial`` or ``no``. dots : 6 or 8.
+    direction : ``forward`` when the table is not made for back-translation.
+    """
+
+    file: str
+    language: str
+    grade: str
+    name: str
+    contraction: str
+    dots: int
+    direction: str
+
+
+@cache
+def list_tables() -> tuple[TableInfo, ...]:
+    """All tables that carry metadata, sorted by language, grade and file.
+
+    Raises
+    ------
+    LouisMissing
+        When liblouis is not installed.
+    """
+    found = (_info(path) for path in louis_binding.listed_tables())
+    return tuple(sorted(found, key=lambda info: (info.language, info.grade, info.file)))
+
+
+def _info(path: str) -> TableInfo:
+    def value(key: str) -> str:
+        return louis_binding.table_info(path, key)
+
+    return TableInfo(
+        file=Path(path).name,
+        language=value("language"),
+        grade=value("grade"),
+        name=value("display-name") or value("index-name") or value("name"),
+        contraction=value("contraction"),
+        dots={"6": 6, "8": 8}.get(value("dots"), 0),
+        direction=value("direction"),
+    )
+
+
+def resolve_tables(spec: str) -> tuple[str, ...]:
+    """The table list a person means by `spec`.
+
+    Parameters
+    ----------
+    spec : a file name (``en-ueb-g2.ctb``), a list (``a.ctb,b.dic``), or a query (``language:de grade:2``).
+        Of several that answer a query, 6-dot literary tables come first, then what liblouis finds best.
+
+    Raises
+    ------
+    TableMissing
+        When nothing fits or the tables do not compile; the message names the nearest.
+    LouisMissing
+        When liblouis is not installed.
+    """
+    wish = _checked(spec)
+    if _is_query(wish):
+        return (_answer(wish),)
+    tables = tuple(part.strip() for part in wish.split(",") if part.strip())
+    if tables and louis_binding.compiles(tables):
+        return tables
+    raise TableMissing(_complaint(wish, tables))
+
+
+def _checked(spec: str) -> str:
+    wish = spec.strip()
+    if not wish:
+        raise TableMissing("table: the name is empty; 'dotwave tables' lists all")
+    if len(wish) > MOST_NAMED:
+        raise TableMissing(f"table: {len(wish)} characters; a name or list of names has at most {MOST_NAMED}")
+    if _NO_NAME.search(wish):
+        raise TableMissing(f"table {wish[:60]!r}: a character that no table's name has; 'dotwave tables' lists all")
+    return wish
+
+
+def _is_query(wish: str) -> bool:
+    return ":" in wish and not any(sign in wish for sign in "/\\")
+
+
+def _answer(query: str) -> str:
+    wishes = [part.partition(":") for part in query.split()]
+    fitting = [path for path in louis_binding.listed_tables() if all(_fits(path, k, v) for k, _, v in wishes)]
+    if not fitting:
+        raise TableMissing(f"table: none answers the query {query!r}{_nearest_answers(wishes)}")
+    best = louis_binding.best_table(query)
+
+    def rank(path: str) -> tuple[bool, bool, bool, str]:
+        eight, kind = louis_binding.table_info(path, "dots") == "8", louis_binding.table_info(path, "type")
+        return eight, kind != "literary", path != best, path
+
+    return Path(min(fitting, key=rank)).name
+
+
+def _fits(path: str, key: str, value: str) -> bool:
+    found = louis_binding.table_info(path, key).casefold()
+    wanted = value.casefold()
+    return found == wanted or (key == "language" and found.startswith(wanted + "-"))
+
+
+def _nearest_answers(wishes: list[tuple[str, str, str]]) -> str:
+    wanted = next((value.casefold() for key, _, value in wishes if key == "language"), "")
+    tables = list_tables()
+    close = [info for info in tables if info.language.casefold().split("-")[0] == wanted.split("-")[0]]
+    if not close:
+        names = get_close_matches(wanted, sorted({info.language for info in tables}), n=3, cutoff=0.5)
+        return f"; languages nearest to {wanted!r}: {', '.join(names)}" if names else "; 'dotwave tables' lists all"
+    shown = ", ".join(f"{info.file} (grade {info.grade or 'not stated'})" for info in close[:4])
+    return f"; for language {wanted} there are: {shown}"
+
+
+# liblouis keeps names in buffers of its own.
+MOST_NAMED = 1000
+# Control characters, and halves of surrogate pairs.
+_NO_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
+_PLACE = re.compile(r"[^\n]*?:\d+(?=: )")
+
+
+def _complaint(wish: str, tables: tuple[str, ...]) -> str:
+    known = {info.file: info for info in list_tables()}
+    files = {path.name for folder in _folders() for path in folder.iterdir()}
+    missing = [name for name in tables if name not in files and not Path(name).is_file()]
+    if not missing:
+        # Only where it stands: what stands there may be of a file that is none of the reader's business.
+        place = _PLACE.match(louis_binding.complaint())
+        where = f": {place[0]}: expected a rule of liblouis (lou_checktable says more)" if place else ""
+        return f"table {wish!r} does not compile{where}; choose another ('dotwave tables')"
+    name = missing[0]
+    lowered = {file.casefold(): file for file in known}
+    close = [lowered[match] for match in get_close_matches(name.casefold(), list(lowered), n=3, cutoff=0.6)]
+    named = [file for file, info in known.items() if name.casefold() in info.name.casefold()]
+    nearest = list(dict.fromkeys(close + named))[:4]
+    return f"table {name!r}: no such table; " + (
+        f"nearest: {', '.join(nearest)}" if nearest else "'dotwave tables' lists all"
+    )
+
+
+@cache
+def _folders() -> tuple[Path, ...]:
+    folders = {Path(path).parent for path in louis_binding.listed_tables()}
+    return tuple(sorted(folder for folder in folders if folder.is_dir()))
+
+
+def foreign_tables(spec: str) -> tuple[str, ...]:
+    """Those of the tables a person means by `spec` that liblouis did not bring along.
+
+    Files of the current folder that bear a name of liblouis's own are among them: they would be taken for it.
+
+    Raises
+    ------
+    TableMissing
+        When nothing answers a query, or the names cannot be any.
+    LouisMissing
+        When liblouis is not installed.
+    """
+    wish = _checked(spec)
+    names = [_answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
+    own = {path.name for folder in _folders() for path in folder.iterdir()}
+    return tuple(name for name in names if name not in own or os.path.lexists(name))
+
+
+def table_dots(tables: tuple[str, ...]) -> int:
+    """6 or 8 as the first table that states it says, 0 when none does."""
+    stated = (louis_binding.table_info(name, "dots") for name in tables)
+    return next((int(dots) for dots in stated if dots in ("6", "8")), 0)
+
+
+@cache
+def hyphenation_tables(tables: tuple[str, ...]) -> tuple[str, ...]:
+    """`tables` with the hyphenation dictionary of their language, or () when there is none."""
+    if any(Path(name).name.startswith("hyph_") for name in tables):
+        return tables
+    spoken = next(filter(None, (louis_binding.table_info(name, "language") for name in tables)), "")
+    for folder in _folders() if spoken else ():
+        language = spoken.split("-")[0].casefold()
+        for path in sorted((*folder.glob(f"hyph_{language}.dic"), *folder.glob(f"hyph_{language}_*.dic"))):
+            together = (*tables, str(path))
+            if louis_binding.compiles(together):
+                return together
+    return ()

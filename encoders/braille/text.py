@@ -1,0 +1,247 @@
+"""Text to a scene of Braille frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import EmptyText, LayoutError
+from ..scene import Frame, GridShape, Scene, TargetPattern
+from . import louis_binding
+from .alphabet import alphabet
+from .back_check import BackCheck, back_check
+from .dots import BLANK, HIGHEST_6_DOT
+from .layout import Layout, PlacedWord, paginate
+from .presentation import MIN_PART_S, Presentation, presenter, read_cells
+from .readers.sources import SourceKind, TextSource
+from .report import EncodingReport, ReportLog, Split
+from .tables import resolve_tables, table_dots
+from .transcribe import PARAGRAPH_END, Transcriber
+from .undefined import Undefined, writable
+
+__all__ = ["TextFrames", "TextOptions", "TextScene", "encode_text"]
+
+DEFAULT_RATE = 6.0
+SHORT_PAGE_S = 1.0
+"""A page with few cells lasts as long as it would with more, up to this."""
+
+
+@dataclass(frozen=True)
+class TextOptions:
+    """How a text is encoded.
+
+    Attributes
+    ----------
+    table : translation table: a file name, a comma list, or a query such as ``language:de grade:2``.
+    undefined : what becomes of characters the table cannot write.
+    cell_gap, line_gap : actuators left free between cells and between lines.
+    rate : cells per second; a page lasts (cells up to its last one) / rate, but at least 1 s or, where that is
+        less, (cells it has room for) / rate. None means 6: 1 s for 3 x 2 cells.
+    dwell_s : seconds a page lasts, instead of `rate`. Shown in parts, a page gives each part an equal share,
+        but at least 0.6 s; it then lasts longer.
+    presentation : dots together, by row, or by dot.
+    blank_between : a blank frame between paragraphs.
+    dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
+    """
+
+    table: str = "en-ueb-g2.ctb"
+    undefined: Undefined = Undefined.NAME
+    cell_gap: int = 0
+    line_gap: int = 0
+    rate: float | None = None
+    dwell_s: float | None = None
+    presentation: Presentation = Presentation.TOGETHER
+    blank_between: bool = False
+    dots: int | None = None
+
+
+@dataclass(frozen=True)
+class TextScene(Scene):
+    """A scene of Braille; `text_frames` are its frames with their report and check."""
+
+    @property
+    def text_frames(self) -> TextFrames:
+        """The frames, with `report` and `check`."""
+        assert isinstance(self.frames, TextFrames)
+        return self.frames
+
+
+def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions) -> TextScene:
+    """The scene that shows `source` on a grid.
+
+    Frames are made while they are consumed, in memory that does not grow with the text. ``encoding`` holds
+    what a reader of the dots needs: kind, tables, dots, cell_gap, line_gap, lines, cells_per_line, run and
+    hyphen (see `encoders.layout`), presentation, undefined, liblouis (its version).
+
+    Raises
+    ------
+    EmptyText, InvalidText
+        When the text has nothing to show, or is broken.
+    TableMissing, LouisMissing
+        When the table, or the Braille library, cannot be used.
+    LayoutError
+        When the grid has no room, an 8-dot table meets a grid with cells of three rows, or a time is not > 0.
+    UndefinedCharacter
+        When the policy is `error` and a character cannot be written.
+    """
+    if isinstance(source, str):
+        source = TextSource.of_text(source)
+    for name, value in (("rate", options.rate), ("dwell", options.dwell_s)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise LayoutError(f"{name}: expected a number > 0, got {value}")
+    tables = resolve_tables(options.table)
+    dots = _dots(source, tables, shape, options)
+    transcriber = Transcriber(tables, options.undefined, dots)
+    _refuse_unwritable(source, transcriber)
+    layout = Layout(shape, 3 if dots == 6 else 4, options.cell_gap, options.line_gap)
+    if source.kind is SourceKind.TEXT and layout.run >= 4:
+        layout = Layout(shape, layout.height, options.cell_gap, options.line_gap, transcriber.hyphen())
+    encoding = {
+        "kind": source.kind.value,
+        "tables": list(tables),
+        "dots": dots,
+        "cell_gap": options.cell_gap,
+        "line_gap": options.line_gap,
+        "lines": layout.lines,
+        "cells_per_line": layout.cells_per_line,
+        "run": layout.run,
+        "hyphen": layout.hyphen,
+        "presentation": options.presentation.value,
+        "undefined": options.undefined.value,
+        "liblouis": louis_binding.liblouis_version(),
+    }
+    return TextScene(shape, TextFrames(source, transcriber, layout, options, encoding), encoding)
+
+
+def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options: TextOptions) -> int:
+    """6 or 8: what is asked for, else what the table or the cells of the source need and the grid can show."""
+    if options.dots is not None:
+        if options.dots not in (6, 8):
+            raise LayoutError(f"dots: expected 6 or 8, got {options.dots}")
+        return options.dots
+    if source.kind is SourceKind.BRAILLE:
+        eight, what = max(source.text) > HIGHEST_6_DOT, f"{source.name} holds 8-dot cells"
+    else:
+        stated = table_dots(tables)
+        letters = (char for char in sorted(set(source.text)) if char.isalnum())
+        eight = stated == 8 or (not stated and any(alphabet(tables).dots(char) == 8 for char in letters))
+        what = f"table {','.join(tables)} writes 8-dot cells"
+    if not eight:
+        return 6
+    if (shape.rows + options.line_gap) % (4 + options.line_gap):
+        raise LayoutError(
+            f"{what} and a grid of {shape.rows} x {shape.cols} has cells of three rows; choose a 6-dot table, "
+            "or give --dots 6 (dots 7 and 8 are left out)"
+        )
+    return 8
+
+
+def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
+    """Look at the characters once before the first frame, so that a text that cannot be shown fails at once."""
+    letters = alphabet(transcriber.tables)
+    if source.kind is SourceKind.BRAILLE or not letters.lacks(source.text):
+        return
+    if transcriber.undefined is Undefined.ERROR:
+        for start, end in transcriber.paragraphs(source):
+            for _ in transcriber.words(source, start, end, ReportLog()):
+                pass
+    different = "".join(sorted(set(source.text)))
+    if not writable(different, 0, letters, transcriber.undefined, ReportLog()).text.strip():
+        raise EmptyText(
+            f"{source.name}: the table {','.join(transcriber.tables)} can write none of its characters; "
+            "choose another table, or --undefined name"
+        )
+
+
+class TextFrames:
+    """The frames of a text: iterating encodes, iterating again encodes again.
+
+    `report` tells what happened in the last iteration, complete when it came to its end.
+    """
+
+    def __init__(
+        self,
+        source: TextSource,
+        transcriber: Transcriber,
+        layout: Layout,
+        options: TextOptions,
+        encoding: dict[str, Any],
+    ) -> None:
+        self.source = source
+        self.layout = layout
+        self._transcriber = transcriber
+        self._options = options
+        self._encoding = encoding
+        self._log = ReportLog()
+        self._show = presenter(layout, options.presentation)
+        rate = options.rate or DEFAULT_RATE
+        self._s_per_cell = 0.0 if options.dwell_s else 1 / rate
+        self._shortest_s = options.dwell_s or min(SHORT_PAGE_S, layout.capacity / rate)
+
+    @property
+    def report(self) -> EncodingReport:
+        """What happened while the frames were last consumed."""
+        return self._log.report
+
+    def __iter__(self) -> Iterator[Frame]:
+        self._log = log = ReportLog()
+        text, show = self.source.text, self._show
+        between = False
+        for page in paginate(self._words(log), self.layout, self._breaks, self._note):
+            if between:
+                yield self._blank_frame(log, page.start)
+            shown = show(page.cells)
+            dwell_s = max(self._shortest_s, len(page.cells.rstrip(BLANK)) * self._s_per_cell)
+            share_s = dwell_s if len(shown.parts) == 1 else max(dwell_s / len(shown.parts), MIN_PART_S)
+            # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
+            gap = PARAGRAPH_END.match(text, page.end) if page.end_of_paragraph else None
+            span = (page.start, gap.end() if gap else page.end)
+            for pattern in shown.parts:
+                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells)
+            log.frames += len(shown.parts)
+            log.cells += len(page.cells) - page.cells.count(BLANK)
+            log.pages += 1
+            between = self._options.blank_between and page.end_of_paragraph
+
+    def _blank_frame(self, log: ReportLog, position: int) -> Frame:
+        amplitude = np.zeros((self.layout.shape.rows, self.layout.shape.cols), dtype=np.complex128)
+        amplitude.flags.writeable = False
+        frame = Frame(TargetPattern(amplitude), self._shortest_s, log.pages, "", (position, position), "")
+        log.pages += 1
+        log.frames += 1
+        return frame
+
+    def _words(self, log: ReportLog) -> Iterator[PlacedWord]:
+        for start, end in self._transcriber.paragraphs(self.source):
+            yield from self._transcriber.words(self.source, start, end, log)
+            yield PlacedWord("", end, end, (), 0, 0, False)
+
+    def _breaks(self, word: PlacedWord) -> list[int]:
+        return self._transcriber.breaks(self.source, word) if self.layout.hyphen else []
+
+    def _note(self, word: PlacedWord, _cut: int, hyphenated: bool) -> None:
+        start = self.source.text[word.start : min(word.end, word.start + 80)]
+        self._log.split(Split(start, (word.start, word.end), self._log.pages, hyphenated))
+
+    def check(self) -> BackCheck:
+        """Read all frames as fingers would, back-translate, and compare with the source.
+
+        Holds the whole text and its cells at once; for the frames of a book use it on a part.
+        """
+        pages: list[str] = []
+        felt: np.ndarray[Any, np.dtype[np.bool_]] | None = None
+        number = -1
+        for frame in self:
+            dots = np.abs(frame.pattern.amplitude) > 0.5
+            if frame.page != number and felt is not None:
+                pages.append(read_cells(felt, self._encoding))
+                felt = None
+            number = frame.page
+            felt = dots if felt is None else felt | dots
+        if felt is not None:
+            pages.append(read_cells(felt, self._encoding))
+        return back_check(pages, self.source.text, self._encoding)

@@ -1,0 +1,223 @@
+"""From source text to Braille words with their source positions, paragraph by paragraph, piece by piece."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ..errors import TableMissing
+from . import louis_binding
+from .alphabet import alphabet
+from .dots import BLANK, HIGHEST_6_DOT, LOWER_SIX
+from .layout import PlacedWord
+from .readers.sources import SourceKind, TextSource
+from .report import ReportLog
+from .tables import hyphenation_tables
+from .undefined import ZERO_WIDTH_JOINER, Undefined, extends, writable
+
+__all__ = ["PARAGRAPH_END", "Transcriber", "Translation", "translate"]
+
+PIECE = 2000
+"""Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
+LONGEST_HYPHENATED = 100
+PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
+_SPACE = re.compile(r"\s")
+_BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
+
+
+@dataclass(frozen=True)
+class Translation:
+    """Cells of a text, with positions both ways.
+
+    Attributes
+    ----------
+    cells : Unicode Braille, a blank is U+2800.
+    text_of_cell : for each cell the position of the character it comes from, never falling.
+    cell_of_text : for each character the position of its first cell (or the cell it is contracted into).
+    """
+
+    cells: str
+    text_of_cell: tuple[int, ...]
+    cell_of_text: tuple[int, ...]
+
+
+def translate(tables: tuple[str, ...], text: str) -> Translation:
+    """Cells of `text`; Unicode Braille in it passes through, whatever the table says of it.
+
+    Raises
+    ------
+    TableMissing
+        When the tables cannot be used.
+    """
+    cells, text_of_cell, cell_of_text = _translated(tables, text)
+    last = 0
+    repaired = []
+    for position in cell_of_text:  # the library leaves -1 where a character has no cell of its own
+        last = position if position >= 0 else last
+        repaired.append(last)
+    return Translation(cells, tuple(text_of_cell), tuple(repaired))
+
+
+def _translated(tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
+    if not _BRAILLE_RUN.search(text):
+        return _complete(tables, text)
+    cells, text_of_cell, cell_of_text = "", list[int](), list[int]()
+    at = 0
+    for part in _BRAILLE_RUN.split(text):
+        if not part:
+            continue
+        if _BRAILLE_RUN.match(part):
+            some, back, forth = part, list(range(len(part))), list(range(len(part)))
+        else:
+            some, back, forth = _complete(tables, part)
+        text_of_cell += [at + position for position in back]
+        cell_of_text += [len(cells) + position if position >= 0 else -1 for position in forth]
+        cells += some
+        at += len(part)
+    return cells, text_of_cell, cell_of_text
+
+
+def _complete(tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
+    """As the library does it, but to the end of the text also where it stops early."""
+    try:
+        cells, text_of_cell, cell_of_text = louis_binding.translate(tables, text)
+        while len(cell_of_text) < len(text):
+            done = len(cell_of_text)
+            more, back, forth = louis_binding.translate(tables, text[done:])
+            if not forth:
+                raise TableMissing(f"table {','.join(tables)}: stops at {text[done : done + 20]!r}; choose another")
+            text_of_cell += [done + position for position in back]
+            cell_of_text += [len(cells) + position if position >= 0 else -1 for position in forth]
+            cells += more
+    except RuntimeError:
+        why = louis_binding.complaint() or "unknown reason"
+        raise TableMissing(f"table {','.join(tables)}: cannot translate: {why}") from None
+    last = 0
+    for index, position in enumerate(text_of_cell):
+        if position < last:
+            text_of_cell[index] = last
+        else:
+            last = position
+    return cells, text_of_cell, cell_of_text
+
+
+class Transcriber:
+    """Writes sources in Braille with one list of tables.
+
+    Parameters
+    ----------
+    tables : as `resolve_tables` gives them. undefined : policy. dots : 6 leaves dots 7 and 8 out, 8 keeps them.
+    """
+
+    def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int) -> None:
+        self.tables = tables
+        self.undefined = undefined
+        self.dots = dots
+
+    def paragraphs(self, source: TextSource) -> Iterator[tuple[int, int]]:
+        """(start, end) of each paragraph: parted by an empty line or a form feed."""
+        start = 0
+        for match in PARAGRAPH_END.finditer(source.text):
+            if source.text[start : match.start()].strip():
+                yield start, match.start()
+            start = match.end()
+        if source.text[start:].strip():
+            yield start, len(source.text)
+
+    def words(self, source: TextSource, start: int, end: int, log: ReportLog) -> Iterator[PlacedWord]:
+        """Words of one paragraph; together their spans hold every character that is not white space."""
+        text = source.text
+        held: PlacedWord | None = None
+        for base, stop, glued in _pieces(text, start, end):
+            cells, origin = self._piece(source, base, stop, log)
+            at = 0
+            for word in cells.split(BLANK):
+                if word:
+                    first = base + origin[at]
+                    if held is not None:
+                        yield held._replace(end=_end(text, held.start, first))
+                    held = PlacedWord(word, first, first, origin, at, base, glued and at == 0 and held is not None)
+                at += len(word) + 1
+        if held is not None:
+            yield held._replace(end=_end(text, held.start, end))
+
+    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int]]:
+        chunk = source.text[start:stop]
+        if source.kind is SourceKind.BRAILLE:
+            cells, origin = _SPACE.sub(BLANK, chunk), list(range(len(chunk)))
+        else:
+            ready = writable(chunk, start, alphabet(self.tables), self.undefined, log)
+            cells, origin, _ = _translated(self.tables, ready.text)
+            if ready.origins is not None:
+                origin = [ready.origins[position] for position in origin]
+        if self.dots == 6 and max(cells, default="") > HIGHEST_6_DOT:
+            for at, cell in enumerate(cells):
+                if cell > HIGHEST_6_DOT:
+                    log.undefined(chunk[origin[at]], "six dots", cell.translate(LOWER_SIX), start + origin[at])
+            cells = cells.translate(LOWER_SIX)
+        return cells, origin
+
+    def hyphen(self) -> str:
+        """The table's hyphen, empty when there is no hyphenation dictionary for its language."""
+        if not hyphenation_tables(self.tables) or not alphabet(self.tables).writes("-"):
+            return ""
+        return louis_binding.translate_string(self.tables, "-", undefined=True).translate(LOWER_SIX)
+
+    def breaks(self, source: TextSource, word: PlacedWord) -> list[int]:
+        """Cells of `word` before which it may be hyphenated; none inside a contraction."""
+        together = hyphenation_tables(self.tables)
+        text = source.text[word.start : word.end]
+        if not together or len(text) > LONGEST_HYPHENATED:
+            return []
+        first_cell: dict[int, int] = {}
+        for cell in range(len(word.cells)):
+            first_cell.setdefault(word.base + word.origin[word.at + cell] - word.start, cell)
+        return [first_cell[at] for at in _points(together, text) if first_cell.get(at, 0) > 0]
+
+
+@lru_cache(maxsize=4096)
+def _points(tables: tuple[str, ...], word: str) -> list[int]:
+    return louis_binding.hyphenate(tables, word)
+
+
+def _end(text: str, start: int, following: int) -> int:
+    while following > start + 1 and (text[following - 1].isspace() or text[following - 1] == BLANK):
+        following -= 1
+    return max(following, start + 1)
+
+
+def _pieces(text: str, start: int, end: int) -> Iterator[tuple[int, int, bool]]:
+    """(start, end, whether it continues a word) of pieces of at most `PIECE` characters.
+
+    They are cut after a sentence, else at white space, else anywhere but inside a letter with its marks.
+    """
+    glued = False
+    while end - start > PIECE:
+        window = start + PIECE
+        cut = (
+            max(text.rfind(sign, start + PIECE // 2, window) for sign in (". ", ".\n", "! ", "? ", "\u3002", "\u0964"))
+            + 1
+        )
+        if not cut:
+            cut = max(text.rfind(" ", start + 1, window), text.rfind("\n", start + 1, window))
+        if cut <= start:
+            spaces = [match.start() for match in _SPACE.finditer(text, start + 1, window)]
+            cut = spaces[-1] if spaces else _hard_cut(text, start, min(window, (start + end) // 2 + 1))
+        yield start, cut, glued
+        glued = not (text[cut].isspace() or text[cut - 1].isspace())
+        start = cut
+    yield start, end, glued
+
+
+def _hard_cut(text: str, start: int, cut: int) -> int:
+    """The last place at or before `cut` that is not inside a cluster."""
+    back = cut
+    while back > start + 1 and (extends(text[back]) or text[back - 1] == ZERO_WIDTH_JOINER):
+        back -= 1
+    flags = 0
+    while back - flags > start and "\U0001f1e6" <= text[back - flags - 1] <= "\U0001f1ff":
+        flags += 1
+    back -= flags % 2
+    return back if back > start else cut

@@ -1,0 +1,3 @@
+"""Pictures to patterns: read, found, fitted to the grid, judged."""
+
+__all__: list[str] = []

@@ -1,0 +1,283 @@
+"""Pictures to a scene: what should be felt of an icon or a photograph on a handful of actuators."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..braille.presentation import MIN_PART_S
+from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
+from .errors import EmptyPicture
+from .figure import Step, figure_steps, spaced_steps, style_of
+from .fit import Candidate, Window, best_patterns, choose_windows, plain_size, sampled
+from .options import Fit, Output, PictureOptions, RegionsBy, Style
+from .limits import PictureLimits
+from .reading import Picture, read_picture
+from .regions import TEXTURES, Region, dot_regions, textured
+from .similarity import POINTS, agreement, target_of
+from .steps import background_light, composite, content_box, luminance
+from .views import views
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+__all__ = ["FrameReport", "PictureReport", "PictureScene", "encode_picture", "explain_picture"]
+
+Floats = NDArray[np.float64]
+
+PIXELS_PER_ACTUATOR = 12
+FEWEST_PIXELS, MOST_PIXELS = 72, 1536
+GAINS = (0.7, 0.85, 1.0, 1.2, 1.4, 1.7)
+
+
+@dataclass(frozen=True)
+class FrameReport:
+    """How one frame was made.
+
+    Attributes
+    ----------
+    view : ``overview``, or which part of the picture. steps : names of the steps taken, in order.
+    similarity : of the frame's dots (or levels) with the figure, at most 1 (see `encoders.picture_similarity`).
+    candidates : good on/off patterns of the figure, best first. regions : of a texture, else empty.
+    figure : float64, shape (4 rows, 4 cols), read-only, 0..1: the figure as the best candidate's window cuts it out.
+    """
+
+    view: str
+    steps: tuple[str, ...]
+    similarity: float
+    candidates: tuple[Candidate, ...]
+    figure: Floats
+    regions: tuple[Region, ...] = ()
+
+
+@dataclass(frozen=True)
+class PictureReport:
+    """How a picture was encoded.
+
+    Attributes
+    ----------
+    name : how it is called. kind : its format. size : (height, width) in pixels. style : the defaults used.
+    notes : what was left out while reading. frames : one for each frame of the scene.
+    """
+
+    name: str
+    kind: str
+    size: tuple[int, int]
+    style: Style
+    notes: tuple[str, ...]
+    frames: tuple[FrameReport, ...]
+
+    @property
+    def similarity(self) -> float:
+        """Mean over the frames."""
+        return sum(frame.similarity for frame in self.frames) / len(self.frames)
+
+
+@dataclass(frozen=True)
+class PictureScene(Scene):
+    """A scene made of a picture, with its report; `frames` is a tuple."""
+
+    report: PictureReport = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """A frame's pattern and how it came about."""
+
+    pattern: TargetPattern
+    report: FrameReport
+    steps: tuple[Step, ...]
+    seconds: float = 0.0
+
+
+def encode_picture(
+    source: str | os.PathLike[str] | bytes | Image,
+    shape: GridShape,
+    options: PictureOptions | None = None,
+    limits: PictureLimits | None = None,
+) -> PictureScene:
+    """The scene that shows a picture on a grid: one frame, or those of an animation, an overview and its parts.
+
+    Parameters
+    ----------
+    source : path, bytes of a file, or Pillow image. limits : how much is read.
+
+    Returns
+    -------
+    PictureScene
+        Its frames' targets are 0 or 1 (on/off), 0 or one of the levels, or complex amplitudes of waves and bars
+        (texture; `phase_matters` is then set). A frame of an animation lasts as the file says, but at least 0.6 s.
+
+    Raises
+    ------
+    PictureError
+        When the picture cannot be read, or an option does not fit; `EmptyPicture` when nothing can be felt of it.
+    """
+    options = options or PictureOptions()
+    picture, options = _read(source, shape, options, limits)
+    # The steps' images are many times larger than what is kept of a frame.
+    made = [replace(one, steps=()) for one in _frames(picture, shape, options)]
+    if not any(one.pattern.amplitude.any() for one in made):
+        raise EmptyPicture(
+            f"{picture.name}: nothing to feel, it is one flat tone; give another background or even out its contrast"
+        )
+    frames = tuple(
+        Frame(one.pattern, max(one.seconds, MIN_PART_S) if one.seconds else options.dwell_s, page)
+        for page, one in enumerate(made)
+    )
+    reports = tuple(one.report for one in made)
+    report = PictureReport(picture.name, picture.kind, picture.size, options.style, picture.notes, reports)
+    return PictureScene(shape, frames, _encoding(picture, options), report=report)
+
+
+def explain_picture(
+    source: str | os.PathLike[str] | bytes | Image,
+    shape: GridShape,
+    options: PictureOptions | None = None,
+    limits: PictureLimits | None = None,
+) -> tuple[Step, ...]:
+    """The steps of the first frame in order, each with its picture; raises as `encode_picture` does."""
+    picture, options = _read(source, shape, options or PictureOptions(), limits)
+    made = next(_frames(picture, shape, options))
+    added = [np.kron(made.report.figure, np.ones((4, 4))).astype(np.float32), _drawn(made.pattern.amplitude)]
+    if options.crop:
+        top, bottom, left, right = content_box(made.steps[-1].image)
+        added.insert(0, made.steps[-1].image[top:bottom, left:right])
+    names = made.report.steps[len(made.steps) :]
+    return (*made.steps, *(Step(name, image) for name, image in zip(names, added, strict=True)))
+
+
+def _read(
+    source: Any, shape: GridShape, options: PictureOptions, limits: PictureLimits | None
+) -> tuple[Picture, PictureOptions]:
+    longest = PIXELS_PER_ACTUATOR * max(shape.rows, shape.cols) * options.zoom
+    picture = read_picture(source, min(max(longest, FEWEST_PIXELS), MOST_PIXELS), limits)
+    if options.style is not Style.AUTO:
+        return picture, options.resolved(options.style)
+    light = picture.frames[0].light
+    drawn = picture.kind == "SVG" or float(light[..., 3].min()) < 0.5
+    style = Style.ICON if drawn else style_of(luminance(composite(light, background_light(light, options.background))))
+    return picture, options.resolved(style)
+
+
+def _encoding(picture: Picture, options: PictureOptions) -> dict[str, Any]:
+    return {
+        "kind": "picture",
+        "picture": Path(picture.name).name,
+        "format": picture.kind,
+        "style": str(options.style),
+        "fit": str(options.fit),
+        "output": str(options.output),
+        "zoom": options.zoom,
+        "overlap": options.overlap,
+    }
+
+
+def _frames(picture: Picture, shape: GridShape, options: PictureOptions) -> Iterator[_Made]:
+    """Every frame of an animation; of each the overview, then its parts in reading order."""
+    high_m, wide_m = shape.rows * options.pitch_m[0], shape.cols * options.pitch_m[1]
+    for raster in picture.frames:
+        height, width = raster.light.shape[:2]
+        plain = figure_steps(raster.light, options)
+        high, wide = plain_size(plain[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+        pixels_per_m = (high * wide / (high_m * wide_m)) ** 0.5
+        steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m)
+        yield replace(
+            _viewed(steps, "overview", _windows(steps, shape, options), shape, options), seconds=raster.seconds
+        )
+        parts = views(height, width, wide_m / high_m, options.zoom, options.overlap)[1:]
+        if parts:
+            steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m / options.zoom)
+        for view in parts:
+            windows = [Window(view.top, view.bottom, view.left, view.right)]
+            yield replace(_viewed(steps, view.name, windows, shape, options), seconds=raster.seconds)
+
+
+def _windows(steps: list[Step], shape: GridShape, options: PictureOptions) -> list[Window]:
+    return choose_windows(steps[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+
+
+def _viewed(steps: list[Step], view: str, windows: list[Window], shape: GridShape, options: PictureOptions) -> _Made:
+    figure = steps[-1].image
+    fitted = best_patterns(figure, windows, shape, options.candidates)
+    best = fitted.candidates[0]
+    similarity, regions = best.similarity, tuple[Region, ...]()
+    if options.output is Output.LEVELS:
+        pattern, similarity = _levelled(steps, best.window, shape, options)
+    elif options.output is Output.TEXTURE:
+        pattern, regions = _textured(steps, best, shape, options)
+    else:
+        pattern = TargetPattern(_frozen(best.dots.astype(np.complex128)))
+    last = [f"fit ({options.fit})", str(options.output).replace("_", "/")]
+    names = (*(step.name for step in steps), *(["crop"] if options.crop else []), *last)
+    lattice = fitted.figure.copy()
+    lattice.flags.writeable = False
+    report = FrameReport(view, names, similarity, fitted.candidates, lattice, regions)
+    return _Made(pattern, report, tuple(steps))
+
+
+def _levelled(
+    steps: list[Step], window: Window, shape: GridShape, options: PictureOptions
+) -> tuple[TargetPattern, float]:
+    """Tone to the nearest level, with the gain that is most similar; similarity is with the tone."""
+    tone = _tone(steps)
+    target = target_of(sampled(tone, [window], shape), shape)
+    means = _dot_means(target.figure[0], shape)
+    levels = np.append(0.0, 10 ** (-options.level_step_db / 20 * np.arange(options.levels)))
+    tries = np.stack([levels[np.abs(gain * means[..., None] - levels).argmin(axis=-1)] for gain in GAINS])
+    scores = agreement(target, tries)[0]
+    best = int(scores.argmax())
+    return TargetPattern(_frozen(tries[best].astype(np.complex128))), float(scores[best])
+
+
+def _tone(steps: list[Step]) -> NDArray[np.float32]:
+    """Brightness as it is seen, from the second to the 98th percentile as 0..1, turned over as the figure is."""
+    named = {step.name: step.image for step in steps}
+    seen = named.get("local contrast", np.sqrt(np.clip(named["luminance"], 0, 1)))
+    low, high = np.percentile(seen, (2, 98))
+    tone: NDArray[np.float32] = np.clip((seen - low) / max(high - low, 1e-6), 0, 1).astype(np.float32)
+    figure = steps[-1].image
+    falling = float(((tone - tone.mean()) * (figure - figure.mean())).sum()) < 0
+    return 1 - tone if falling else tone
+
+
+def _textured(
+    steps: list[Step], best: Candidate, shape: GridShape, options: PictureOptions
+) -> tuple[TargetPattern, tuple[Region, ...]]:
+    colour = np.ascontiguousarray(np.moveaxis(steps[0].image, 2, 0))
+    means = np.stack([_dot_means(sampled(one, [best.window], shape)[0], shape) for one in colour], axis=-1)
+    labels = dot_regions(means, best.dots.astype(np.float64), options.regions, options.regions_by is RegionsBy.COLOUR)
+    regions = []
+    for index in range(int(labels.max()) + 1):
+        mine = labels == index
+        if mine.any():
+            red, green, blue = (float(value) for value in means[mine].mean(axis=0))
+            texture = TEXTURES[index - 1] if index else None
+            regions.append(Region((red, green, blue), int(mine.sum()), texture))
+    waves = any(region.texture and region.texture.kind is PatternKind.SINE for region in regions)
+    kind = PatternKind.SINE if waves else PatternKind.BARS
+    return TargetPattern(_frozen(textured(labels)), kind, phase_matters=True), tuple(regions)
+
+
+def _dot_means(lattice: Floats, shape: GridShape) -> Floats:
+    means: Floats = lattice.reshape(shape.rows, POINTS, shape.cols, POINTS).mean(axis=(1, 3))
+    return means
+
+
+def _drawn(amplitude: NDArray[np.complex128]) -> NDArray[np.float32]:
+    """Dots as discs of 16 pixels, as bright as they are strong; a phase is drawn as it is at one moment."""
+    side = np.arange(16) - 7.5
+    disc = (np.hypot(side[:, None], side) < 6.5).astype(np.float32)
+    strength = np.where(amplitude.imag == 0, np.abs(amplitude), 0.5 * np.abs(amplitude) + 0.5 * amplitude.real)
+    return np.kron(0.06 + 0.94 * strength, disc).astype(np.float32)
+
+
+def _frozen(amplitude: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    amplitude.flags.writeable = False
+    return amplitude
