@@ -1,6 +1,6 @@
 """``python -m dotwave``: the command line."""
 
-from .cli import main
+from .cli.app import main
 
 __all__: list[str] = []
 

@@ -68,6 +68,7 @@ from .picture.errors import (
 from .picture.figure import (
     Step as Step,
 )
+from .picture.limits import PictureLimits as PictureLimits
 from .picture.options import (
     Fit as Fit,
     Invert as Invert,
@@ -83,7 +84,6 @@ from .picture.pictures import (
     encode_picture as encode_picture,
     explain_picture as explain_picture,
 )
-from .picture.limits import PictureLimits as PictureLimits
 from .picture.similarity import (
     similarities as similarities,
 )

@@ -37,7 +37,7 @@ def dotwave(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
 
     def call(*arguments: object) -> Ended:
-        from dotwave.cli import main
+        from dotwave.cli.app import main
 
         monkeypatch.setattr(sys, "argv", ["dotwave", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:

@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from dotwave.bench import BenchReport, run_bench
 from dotwave.errors import AppError
+from dotwave.studies.bench import BenchReport, run_bench
 
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
 
@@ -244,7 +244,7 @@ def test_a_text_is_measured_by_the_command_itself(monkeypatch):
 
 
 def test_outside_a_source_tree(monkeypatch, tmp_path):
-    monkeypatch.setattr("dotwave.bench.HARNESS", tmp_path / "harness.py")
+    monkeypatch.setattr("dotwave.studies.bench.HARNESS", tmp_path / "harness.py")
     with pytest.raises(AppError, match="source tree"):
         run_bench(tmp_path, quick=True)
 
@@ -252,7 +252,7 @@ def test_outside_a_source_tree(monkeypatch, tmp_path):
 def test_a_harness_that_fails_says_why(monkeypatch, tmp_path):
     broken = tmp_path / "harness.py"
     broken.write_text("raise SystemExit('no room')")
-    monkeypatch.setattr("dotwave.bench.HARNESS", broken)
+    monkeypatch.setattr("dotwave.studies.bench.HARNESS", broken)
     with pytest.raises(AppError, match="no room"):
         run_bench(tmp_path, quick=True)
 

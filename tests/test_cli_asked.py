@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 
 from chainsim import Outcome, load_device
-from dotwave.asked import TOLERANCES, FrameAsked, asked_of, frame_asked, tolerance_of
 from dotwave.errors import AppError
-from dotwave.study import Study
+from dotwave.request import TOLERANCES, FrameAsked, asked_of, frame_asked, tolerance_of
+from dotwave.studies.study import Study
 from encoders import GridShape, Scene, TextOptions, TextSource, encode_text
 from planner import FramePlan, Plan, plan_scene
 

@@ -15,9 +15,9 @@ import yaml
 from numpy.typing import NDArray
 
 from chainsim import Device, ProfileError, load_device
-from dotwave.calibrate import CalibrateReport, calibrate
 from dotwave.errors import AppError
-from dotwave.measured_sweeps import COLUMNS, read_sweeps
+from dotwave.studies.calibrate import CalibrateReport, calibrate
+from dotwave.studies.measured_sweeps import COLUMNS, read_sweeps
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = ROOT / "samples" / "calibration" / "sweep.csv"
@@ -182,9 +182,9 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
 
 def test_more_points_than_memory_is_good_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "sweep.csv").write_text(some(), encoding="utf-8")
-    monkeypatch.setattr("dotwave.measured_sweeps.MOST_POINTS", 24)
+    monkeypatch.setattr("dotwave.studies.measured_sweeps.MOST_POINTS", 24)
     read_sweeps(str(tmp_path / "sweep.csv"), DEVICE)
-    monkeypatch.setattr("dotwave.measured_sweeps.MOST_POINTS", 23)
+    monkeypatch.setattr("dotwave.studies.measured_sweeps.MOST_POINTS", 23)
     with pytest.raises(AppError, match=r"sweep\.csv: more than 23 points; sweep fewer, or a row at a time"):
         read_sweeps(str(tmp_path / "sweep.csv"), DEVICE)
 
@@ -295,7 +295,7 @@ def test_another_row_is_added_to_what_is_known(tmp_path: Path, monkeypatch: pyte
         {"row": 3, "col": 2, "f0_hz": 140.0, "delta": 0.004, "plus_minus": {"f0_hz": 0.1}},
     ]
     known = load_device(str(profile(tmp_path, before)))
-    monkeypatch.setattr("dotwave.calibrate.load_device", lambda name: known)
+    monkeypatch.setattr("dotwave.studies.calibrate.load_device", lambda name: known)
     out = tmp_path / "both.yaml"
     calibrate(str(SAMPLE), device="known", out=out, lam_set=6e-3)
     device = load_device(str(out))

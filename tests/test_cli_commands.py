@@ -23,7 +23,7 @@ import encoders
 import planner
 from chainsim import device_names
 from dotwave.errors import AppError
-from dotwave.report import FrameCheck, TextReport, VerifyReport
+from dotwave.reports.text import FrameCheck, TextReport, VerifyReport
 from dotwave.source import text_source
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,7 +62,7 @@ def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
         given.update(others, source=source)
         return BRIEF
 
-    stand_in("pipeline", render_text=render)
+    stand_in("rendering.text", render_text=render)
     ended = dotwave(
         "text", "Hello", "-d", "linked-6x6", "-o", "x.wav", "--table", "language:de grade:2", "--undefined", "drop",
         "--cell-gap", 1, "--line-gap", 2, "--rate", 3.5, "--presentation", "by-row", "--dots", 6, "--blank-between",
@@ -81,14 +81,14 @@ def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
 
 def test_text_leaves_unsaid_options_to_the_encoder(dotwave, stand_in) -> None:
     given = {}
-    stand_in("pipeline", render_text=lambda source, **others: given.update(others) or BRIEF)
+    stand_in("rendering.text", render_text=lambda source, **others: given.update(others) or BRIEF)
     dotwave("text", "Hello")
     assert given["options"] == encoders.TextOptions()
 
 
 @pytest.mark.parametrize(("outcomes", "code"), [({"ok": 2}, 0), ({"ok": 1, "unreachable": 1}, 1)])
 def test_text_exit_code_and_json(dotwave, stand_in, outcomes, code) -> None:
-    stand_in("pipeline", render_text=lambda *_, **__: replace(BRIEF, outcomes=outcomes, error=float("nan")))
+    stand_in("rendering.text", render_text=lambda *_, **__: replace(BRIEF, outcomes=outcomes, error=float("nan")))
     ended = dotwave("text", "Hello", "--json")
     assert ended.code == code
     answer = json.loads(ended.out, parse_constant=pytest.fail)
@@ -99,7 +99,7 @@ def test_text_exit_code_and_json(dotwave, stand_in, outcomes, code) -> None:
 @pytest.mark.parametrize("options", [[], ["--json"]])
 def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options) -> None:
     sly = replace(BRIEF, undefined=("\x1b[2J named", "\x9b2J named"), notes=("\u2801 déjà\u00a0vu",))
-    stand_in("pipeline", render_text=lambda *_, **__: sly)
+    stand_in("rendering.text", render_text=lambda *_, **__: sly)
     out = dotwave("text", "Hello", *options).out
     assert "\x1b" not in out
     assert "\x9b" not in out
@@ -110,7 +110,7 @@ def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options)
 
 @pytest.mark.parametrize(("report", "code"), [(GOOD, 0), (BAD, 1), (replace(GOOD, text_equal=False), 1)])
 def test_verify_exit_code(dotwave, stand_in, report, code) -> None:
-    stand_in("verify", verify=lambda path: report)
+    stand_in("verification", verify=lambda path: report)
     assert dotwave("verify", "x.wav").code == code
     assert json.loads(dotwave("verify", "x.wav", "--json").out)["ok"] is (code == 0)
 
@@ -122,7 +122,7 @@ def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
     def fail(path: Path) -> VerifyReport:
         raise root(f"{path}: what is wrong\nand the cure")
 
-    stand_in("verify", verify=fail)
+    stand_in("verification", verify=fail)
     ended = dotwave("verify", "x.wav")
     assert (ended.code, ended.out, ended.err) == (2, "", "dotwave: x.wav: what is wrong and the cure\n")
 
@@ -131,7 +131,7 @@ def test_ctrl_c_is_130(dotwave, stand_in) -> None:
     def interrupt(path: Path) -> VerifyReport:
         raise KeyboardInterrupt
 
-    stand_in("verify", verify=interrupt)
+    stand_in("verification", verify=interrupt)
     assert dotwave("verify", "x.wav").code == 130
 
 
@@ -150,8 +150,8 @@ def verify(path):
         signal.pause()
     finally:
         partial.unlink()
-sys.modules["dotwave.verify"] = types.ModuleType("dotwave.verify")
-sys.modules["dotwave.verify"].verify = verify
+sys.modules["dotwave.verification"] = types.ModuleType("dotwave.verification")
+sys.modules["dotwave.verification"].verify = verify
 sys.argv = ["dotwave", "verify", "x.wav"]
 main()
 """

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import encoders
-from dotwave import doctor
-from dotwave.doctor import Check, Health, examine
+from dotwave.cli import doctor
+from dotwave.cli.doctor import Check, Health, examine
 
 
 def found(name: str) -> Check:

@@ -23,9 +23,9 @@ def failing(dotwave, monkeypatch: pytest.MonkeyPatch):
         def fail(path: Path) -> None:
             raise error
 
-        fake = ModuleType("dotwave.verify")
+        fake = ModuleType("dotwave.verification")
         fake.verify = fail
-        monkeypatch.setitem(sys.modules, "dotwave.verify", fake)
+        monkeypatch.setitem(sys.modules, "dotwave.verification", fake)
         return dotwave("verify", "x.wav")
 
     return end

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from chainsim import load_device
-from dotwave import extent
-from dotwave.extent import extent_of
-from dotwave.pipeline import render_text
+from dotwave.rendering import extent
+from dotwave.rendering.extent import extent_of
+from dotwave.rendering.text import render_text
 from encoders import GridShape, Presentation, TextOptions, encode_text
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -13,9 +13,9 @@ import pytest
 import typer.main
 
 from chainsim import device_names
-from dotwave.cli import app
-from dotwave.cli_help import GROUPS
-from dotwave.completion import completed_devices, completed_files
+from dotwave.cli.app import app
+from dotwave.cli.completion import completed_devices, completed_files
+from dotwave.cli.help import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMANDS = typer.main.get_command(app).commands

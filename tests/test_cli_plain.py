@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from dotwave.icons import IconOptions, render_icons
-from dotwave.lettering import plain_letters
+from dotwave.figures.lettering import plain_letters
+from dotwave.figures.preview import write_preview
+from dotwave.icon_sets.build import IconOptions, render_icons
 from dotwave.plain import csv_cell, html_words, one_line, printable
-from dotwave.preview import write_preview
-from dotwave.report import FrameCheck, VerifyReport
+from dotwave.reports.text import FrameCheck, VerifyReport
 
 ROOT = Path(__file__).resolve().parent.parent
 HEART = ROOT / "samples" / "icons" / "heart.svg"

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
-from dotwave.card import CardShape, draw_card, draw_disc
 from dotwave.errors import AppError
-from dotwave.lettering import PAPER, cells_width, draw_cells, fit, font, has_glyphs
-from dotwave.preview import FRAMES_PER_PICTURE, write_preview
-from dotwave.report import FrameCheck, VerifyReport
-from dotwave.spoken import spoken
+from dotwave.figures.card import CardShape, draw_card, draw_disc
+from dotwave.figures.lettering import PAPER, cells_width, draw_cells, fit, font, has_glyphs
+from dotwave.figures.preview import FRAMES_PER_PICTURE, write_preview
+from dotwave.reports.spoken import spoken
+from dotwave.reports.text import FrameCheck, VerifyReport
 from drivers import DriverError
 
 
@@ -196,7 +196,7 @@ def test_the_files_of_a_preview_are_all_old_or_all_new(tmp_path: Path, monkeypat
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("dotwave.preview._spell", full)
+        patch.setattr("dotwave.figures.preview._spell", full)
         with pytest.raises(DriverError, match=r"x\.txt: the disk is full"):
             write_preview(report(frame(text="other")), tmp_path / "x")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

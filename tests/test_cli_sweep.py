@@ -14,9 +14,9 @@ import pytest
 
 from chainsim import ProfileError, simulate
 from dotwave.errors import AppError
-from dotwave.sweep_files import Parts
-from dotwave.sweep_io import FIELDS, run_sweep
-from dotwave.sweep_picture import draw_map
+from dotwave.figures.sweep_map import draw_map
+from dotwave.studies.sweep import FIELDS, run_sweep
+from dotwave.studies.sweep_files import Parts
 from drivers import FileError
 
 TEXT = """\
@@ -103,7 +103,7 @@ def test_the_file_does_not_depend_on_the_workers(source, tmp_path):
 def test_goes_on_where_it_was_stopped(source, tmp_path, monkeypatch):
     monkeypatch.setattr("chainsim.batch.sweep._UNIT", 48)
     run_sweep(source, tmp_path / "whole.npz", units=1)
-    import dotwave.sweep_io as module
+    import dotwave.studies.sweep as module
 
     solve, calls = module._answers, []
 
@@ -129,7 +129,7 @@ def test_parts_of_another_sweep_are_refused(source, tmp_path, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dotwave.sweep_io._answers", stop)
+    monkeypatch.setattr("dotwave.studies.sweep._answers", stop)
     with pytest.raises(KeyboardInterrupt):
         run_sweep(source, tmp_path / "out.npz")
     source.write_text(TEXT.replace("1.0e-8", "1.0e-6"))

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from dotwave.errors import AppError
-from dotwave.sweep_io import run_sweep
+from dotwave.studies.sweep import run_sweep
 
 TEXT = """\
 chain: {n: 3, delta: 6.0e-3, beta: -1.0}
@@ -52,7 +52,7 @@ def whole(source: Path, tmp_path: Path) -> bytes:
 
 def stopped(source: Path, out: Path, monkeypatch: pytest.MonkeyPatch, chunks: int = 7) -> Path:
     """The parts of a run that was stopped after so many chunks; with all seven, when it was to write the file."""
-    import dotwave.sweep_io as module
+    import dotwave.studies.sweep as module
 
     solve, calls = module._answers, []
 
@@ -227,7 +227,7 @@ def test_a_damaged_piece_is_solved_again(
 def test_any_flipped_bit_is_noticed(
     source: Path, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dotwave.sweep_files import Parts
+    from dotwave.studies.sweep_files import Parts
 
     out = tmp_path / "out.npz"
     parts = stopped(source, out, monkeypatch)
@@ -250,7 +250,7 @@ def test_any_flipped_bit_is_noticed(
 def test_a_piece_that_is_damaged_after_it_was_checked_is_one_line(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import dotwave.sweep_io as module
+    import dotwave.studies.sweep as module
 
     out, counted = tmp_path / "out.npz", module._counted
 
@@ -273,7 +273,7 @@ def test_a_piece_that_is_damaged_after_it_was_checked_is_one_line(
 def test_a_second_run_at_the_same_time_is_refused_and_spoils_nothing(
     source: Path, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import dotwave.sweep_io as module
+    import dotwave.studies.sweep as module
 
     out, solve, refused = tmp_path / "out.npz", module._answers, []
 

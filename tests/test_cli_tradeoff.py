@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from dotwave.asked import seconds_of
-from dotwave.cli_plan import plan_app
+from dotwave.cli.plan import plan_app
 from dotwave.errors import AppError
+from dotwave.request import seconds_of
 from drivers import FileError
 from planner import PlanError, trade_off
 

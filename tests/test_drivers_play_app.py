@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from chainsim import load_device
-from dotwave.emulate import EmulateReport, dots_as_braille, emulate, parse_window
 from dotwave.errors import AppError
-from dotwave.play import buffer_notes, list_ports, play
+from dotwave.playing.emulate import EmulateReport, dots_as_braille, emulate, parse_window
+from dotwave.playing.play import buffer_notes, list_ports, play
 from drivers import BoardEmulator, BoardRefusal, Faults, Firmware, StreamReport, Window, read_waveform, write_waveform
 from drivers.protocol.pty_line import PtyLine
 from encoders import GridShape, TextOptions, TextSource, encode_text
@@ -154,7 +154,7 @@ class Terminal(io.StringIO):
 
 def test_the_emulator_draws_over_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out, looks = Terminal(), count()
-    monkeypatch.setattr("dotwave.emulate.time", SimpleNamespace(monotonic=lambda: 0.01 * next(looks)))
+    monkeypatch.setattr("dotwave.playing.emulate.time", SimpleNamespace(monotonic=lambda: 0.01 * next(looks)))
     emulate(device="independent-6x6", link=tmp_path / "port", seconds=0.5, out=out)
     frames = out.getvalue().split("\x1b[8A")
     assert len(frames) > 2

@@ -145,15 +145,15 @@ def test_each_limit_refuses_what_breaks_it_alone(tmp_path: Path, case: Case) -> 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_what_is_refused_never_reaches_a_port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: Case) -> None:
-    import dotwave.play
+    import dotwave.playing.play
 
     opened: list[object] = []
     for sink in ("Uart", "play_audio"):
-        monkeypatch.setattr(dotwave.play, sink, lambda *given, **_: opened.append(given))
+        monkeypatch.setattr(dotwave.playing.play, sink, lambda *given, **_: opened.append(given))
     path = written(tmp_path, case.volts(), lam=case.lam)
     for options in ({"port": "/dev/ttyACM0"}, {"audio": "0"}):
         with pytest.raises(GateRefusal, match="nothing was sent"):
-            dotwave.play.play(path, live=True, limits=case.limits, **options)
+            dotwave.playing.play.play(path, live=True, limits=case.limits, **options)
     assert not opened
 
 

@@ -283,7 +283,7 @@ def test_a_host_that_dies_leaves_the_output_at_zero(tmp_path: Path, number: int)
 
 
 def test_verify_works_on_what_arrived(tmp_path: Path) -> None:
-    from dotwave.verify import verify
+    from dotwave.verification import verify
     from encoders import GridShape, TextOptions, TextSource, encode_text
     from planner import plan_scene
 

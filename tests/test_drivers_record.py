@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from chainsim import Device, load_device
-from dotwave.emulate import emulate
-from dotwave.verify import verify
+from dotwave.playing.emulate import emulate
+from dotwave.verification import verify
 from drivers import read_waveform, write_waveform
 from drivers.protocol.emulator import Emulator
 from drivers.protocol.messages import FULL_CODE, Samples, Start

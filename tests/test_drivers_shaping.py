@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from chainsim import load_device
-from dotwave.verify import verify
+from dotwave.verification import verify
 from drivers import write_waveform
 from drivers.waveform.shaping import Shaper
 from encoders import Frame, GridShape, Scene, levels

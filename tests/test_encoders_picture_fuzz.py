@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from encoders.picture.errors import PictureError
-from encoders.picture.pictures import encode_picture
 from encoders.picture.limits import PictureLimits
+from encoders.picture.pictures import encode_picture
 from encoders.scene import GridShape
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"

@@ -31,11 +31,11 @@ from PIL import Image
 
 from chainsim import Device, load_device, read_model, read_simulation, read_sweep
 from dotwave.errors import bad_input
-from dotwave.icon_journal import Journal
-from dotwave.icon_sources import find_icons, read_icons
-from dotwave.job import read_job
-from dotwave.measured_sweeps import read_sweeps
-from dotwave.sweep_io import run_sweep
+from dotwave.icon_sets.journal import Journal
+from dotwave.icon_sets.sources import find_icons, read_icons
+from dotwave.jobs.job import read_job
+from dotwave.studies.measured_sweeps import read_sweeps
+from dotwave.studies.sweep import run_sweep
 from drivers import read_exchange, read_waveform, write_exchange
 from drivers.channels import channels_of
 from drivers.formats.samples import writer_for
@@ -427,7 +427,7 @@ def _parts(folder: Path) -> list[bytes]:
     source = folder / "stopped.yaml"
     source.write_bytes(_yaml_bytes(SWEEP))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("dotwave.sweep_io._counted", _stop)
+        patch.setattr("dotwave.studies.sweep._counted", _stop)
         with contextlib.suppress(KeyboardInterrupt):
             run_sweep(source, folder / "stopped.npz")
     (part,) = (folder / "stopped.npz.parts").glob("0*.npz")

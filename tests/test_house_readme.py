@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from dotwave.cli import app
+from dotwave.cli.app import app
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dotwave.icons import IconOptions, render_icons
+from dotwave.icon_sets.build import IconOptions, render_icons
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
-from dotwave.icon_journal import Journal
-from dotwave.icons import IconOptions, render_icons
+from dotwave.icon_sets.build import IconOptions, render_icons
+from dotwave.icon_sets.journal import Journal
 from drivers import FileError
 
 ROOT = Path(__file__).resolve().parent.parent

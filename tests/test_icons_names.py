@@ -17,10 +17,10 @@ from urllib.parse import unquote_to_bytes
 import pytest
 
 from dotwave.errors import AppError
-from dotwave.icon_archives import LONGEST_HEADER
-from dotwave.icon_names import shown_name
-from dotwave.icon_sources import find_icons, read_icons
-from dotwave.icons import IconOptions, render_icons
+from dotwave.icon_sets.archives import LONGEST_HEADER
+from dotwave.icon_sets.build import IconOptions, render_icons
+from dotwave.icon_sets.names import shown_name
+from dotwave.icon_sets.sources import find_icons, read_icons
 
 HEART = (Path(__file__).resolve().parent.parent / "samples" / "icons" / "heart.svg").read_bytes()
 ONE = IconOptions(workers=1, waveforms=True)

@@ -18,10 +18,10 @@ import pytest
 from PIL import Image
 
 from dotwave.errors import AppError
-from dotwave.icon_journal import Journal
-from dotwave.icon_pool import LocalPool
-from dotwave.icon_work import Recipe, Record, Task
-from dotwave.icons import IconOptions, render_icons
+from dotwave.icon_sets.build import IconOptions, render_icons
+from dotwave.icon_sets.journal import Journal
+from dotwave.icon_sets.pool import LocalPool
+from dotwave.icon_sets.work import Recipe, Record, Task
 from drivers import FileError
 from encoders import GridShape, encode_picture
 
@@ -147,7 +147,7 @@ def test_bad_files_are_reported_and_the_rest_is_done(tmp_path: Path) -> None:
 
 
 def test_waveforms_are_written_and_verify(tmp_path: Path) -> None:
-    from dotwave.verify import verify
+    from dotwave.verification import verify
 
     files = [str(SAMPLES / name) for name in ("heart.svg", "play.svg")]
     options = IconOptions(workers=1, waveforms=True)

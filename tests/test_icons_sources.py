@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dotwave.errors import AppError
-from dotwave.icon_sources import find_icons, read_icons
+from dotwave.icon_sets.sources import find_icons, read_icons
 
 PICTURES = {"a/one.svg": b"<svg/>", "a/b/two.png": b"PNG", "three.GIF": b"GIF"}
 OTHERS = {"a/readme.txt": b"", ".hidden/x.svg": b"", "a/._one.svg": b"", "__MACOSX/a/one.svg": b""}

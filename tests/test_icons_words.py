@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dotwave.icon_words import in_braille, in_words
+from dotwave.icon_sets.words import in_braille, in_words
 
 patterns = st.tuples(st.integers(1, 9), st.integers(1, 9)).flatmap(
     lambda shape: arrays(np.float64, shape, elements=st.sampled_from([0.0, 0.5, 1.0]))

@@ -17,9 +17,9 @@ import psutil
 import pytest
 
 from dotwave.errors import AppError
-from dotwave.icon_pool import LocalPool
-from dotwave.icon_work import Recipe, Record, Task
-from dotwave.icons import IconOptions, render_icons
+from dotwave.icon_sets.build import IconOptions, render_icons
+from dotwave.icon_sets.pool import LocalPool
+from dotwave.icon_sets.work import Recipe, Record, Task
 from dotwave.workers import end_with_parent
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "icons"

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from chainsim import ProfileError, load_device
-from dotwave.job import Job, job_schema, read_job
+from dotwave.jobs.job import Job, job_schema, read_job
 from encoders import GridShape, Region as TextureRegion, plane_wave, regions
 
 JOBS = sorted((Path(__file__).resolve().parent.parent / "samples" / "jobs").glob("*.yaml"))

@@ -11,9 +11,9 @@ from PIL import Image
 
 from chainsim import load_device
 from dotwave.errors import AppError
-from dotwave.image import picture_options, render_images
-from dotwave.render import Rendering, render_job
-from dotwave.verify import verify
+from dotwave.rendering.image import picture_options, render_images
+from dotwave.rendering.scene import Rendering, render_job
+from dotwave.verification import verify
 from encoders import EncodeError, GridShape, PictureOptions, encode_picture
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
@@ -108,7 +108,7 @@ def test_the_tolerance_decides_what_is_ok(tmp_path: Path, monkeypatch: pytest.Mo
         (0.2, set()),
     ):
         for name in ("draft", "normal", "fine"):
-            from dotwave import render
+            from dotwave.rendering import scene as render
 
             plain = render.plan_scene
             monkeypatch.setattr(render, "plan_scene", lambda *a, e=error, p=plain, **k: off_by(p(*a, **k), e))

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from chainsim import Device, load_device
 from chainsim.model.calibrated import Actuator
-from dotwave.calibrate import calibrate
-from dotwave.measured_sweeps import COLUMNS
-from dotwave.pipeline import render_text
-from dotwave.report import VerifyReport
-from dotwave.verify import verify
+from dotwave.rendering.text import render_text
+from dotwave.reports.text import VerifyReport
+from dotwave.studies.calibrate import calibrate
+from dotwave.studies.measured_sweeps import COLUMNS
+from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
 from planner import plan_scene

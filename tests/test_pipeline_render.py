@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.io import wavfile
 
 from chainsim import load_device
-from dotwave.pipeline import render_text
-from dotwave.verify import verify
+from dotwave.rendering.text import render_text
+from dotwave.verification import verify
 from drivers import UnreadableWaveform, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
 from planner import plan_scene

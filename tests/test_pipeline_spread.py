@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from chainsim import ProfileError, load_device
-from dotwave.render import render_job
-from dotwave.scene_report import SceneReport
-from dotwave.verify import verify
+from dotwave.rendering.scene import render_job
+from dotwave.reports.scene import SceneReport
+from dotwave.verification import verify
 from planner.closed_forms.links import drive_for, links_for
 from planner.robustness.batch_march import march
 from planner.robustness.spread import Spread, drawn_in

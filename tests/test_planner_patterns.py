@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from chainsim import Device, Outcome, load_device
-from dotwave.verify import verify
+from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import (
     Frame,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chainsim import load_device
-from dotwave.verify import verify
+from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, levels
 from planner import Plan, plan_scene

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chainsim import Device, Outcome, load_device
-from dotwave.verify import verify
+from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TextureError, walking_bars
 from planner import ChainState, Plan, plan_scene

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from chainsim import Chain, Device, GridIntegrator, Outcome, load_device
-from dotwave.verify import verify
+from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, plane_wave
 from planner import Plan, Ramp, plan_scene

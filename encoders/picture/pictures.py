@@ -16,8 +16,8 @@ from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
 from .errors import EmptyPicture
 from .figure import Step, figure_steps, spaced_steps, style_of
 from .fit import Candidate, Window, best_patterns, choose_windows, plain_size, sampled
-from .options import Fit, Output, PictureOptions, RegionsBy, Style
 from .limits import PictureLimits
+from .options import Fit, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
 from .regions import TEXTURES, Region, dot_regions, textured
 from .similarity import POINTS, agreement, target_of

@@ -1,0 +1,3 @@
+"""The command line: thin commands, help, completion, and how a run ends."""
+
+__all__: list[str] = []

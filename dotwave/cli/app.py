@@ -1,0 +1,263 @@
+"""The command line: reads arguments, calls one function, prints.
+
+Exit codes: 0 done; 1 an outcome that is not ok, or a verification that failed; 2 bad input or circumstances, with
+one line on stderr; 70 a fault of the program; 130 after Ctrl-C; 141 when nobody reads the output any more; 143 after
+SIGTERM. Imports that take time stay inside the commands.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from ..errors import Terminated
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
+from .completion import completed_devices, completed_files
+from .ending import ended
+from .help import LOOK, RENDER, SET_UP, STUDY, Commands
+from .options import Dots, Presentation, SampleFormat, Undefined
+from .pictures import picture_app
+from .plan import plan_app
+from .play import play_app
+from .study import study_app
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="dotwave",
+    help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
+    no_args_is_help=True,
+    cls=Commands,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+GAP = "in actuators."
+
+
+@app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
+def text(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="TEXT|FILE|-",
+            help="A file if it exists, - for stdin, else words.",
+            autocompletion=completed_files(".txt", ".brf", ".brl"),
+        ),
+    ],
+    device: Device = "paper-6x6",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
+    ] = None,
+    table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
+    undefined: Annotated[
+        Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
+    ] = None,
+    cell_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty columns between cells, {GAP}")] = None,
+    line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
+    rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
+    dwell: Annotated[float | None, typer.Option(help="Seconds per page, instead of --rate.")] = None,
+    presentation: Annotated[
+        Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")
+    ] = None,
+    dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
+    blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
+    contrast: Annotated[
+        float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
+    ] = 20.0,
+    actuator: Annotated[
+        str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
+    ] = None,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
+    explain: Explain = False,
+    pareto: Pareto = None,
+    yes: Yes = False,
+    as_json: Json = False,
+) -> None:
+    """Render text as Braille and write the waveforms that make it felt.
+
+    TEXT|FILE|-: a path that exists is read as a file (UTF-8, Unicode Braille, or .brf), - is standard
+    input, anything else is the text itself. Words with a slash or a .txt suffix and no spaces are taken
+    for a path, and refused when there is no such file.
+
+    \b
+    Example:
+      dotwave text "Hello world" --device linked-6x6 -o hello.wav
+    """
+    from ..rendering.text import render_text
+    from ..request import asked_of
+    from ..studies.study import Study
+    from .options import place_of, text_options
+
+    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
+    options = text_options(
+        table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
+        presentation=presentation, dots=dots, blank_between=blank_between,
+    )  # fmt: skip
+    report = render_text(
+        source, device=device, out=output, options=options, encoding=sample_format.value,
+        contrast_db=contrast, actuator=place_of(actuator), study=study, yes=yes,
+    )  # fmt: skip
+    told = study.told(report, report.ok)
+    _finish(told, as_json, ok=told.ok)
+
+
+@app.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
+def simulate(
+    chain: Annotated[
+        str,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, its setting and a tolerance; - is stdin.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="As without it: the answer is JSON.")] = False,
+) -> None:
+    """Solve a chain of coupled oscillators and print what it does, as JSON.
+
+    The file says `chain`, `setting`, `rung`, `tol` and `start`; README.md has one to copy. The exit code
+    is 1 when the outcome is not ok; the JSON is printed all the same.
+
+    \b
+    Example:
+      dotwave simulate chain.yaml
+    """
+    from chainsim import simulate as solve
+
+    from ..source import simulation_source
+
+    answer = solve(simulation_source(chain))
+    say(json.dumps(answer, allow_nan=False))
+    raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
+
+
+@app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)
+def verify(out: Written, as_json: Json = False) -> None:
+    """Integrate the full equations under the samples of a written waveform and say what is felt.
+
+    Reads only the samples and the manifest beside them. The exit code is 1 when a dot is wrong, a level
+    is outside its limits, or the text does not come back.
+
+    \b
+    Example:
+      dotwave verify hello.wav
+    """
+    from ..verification import verify as check
+
+    report = check(Path(out))
+    _finish(report, as_json, ok=report.ok)
+
+
+@app.command(short_help="Draw and spell out what a written waveform makes felt.", rich_help_panel=LOOK)
+def preview(
+    out: Written,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Start of the file names; default: OUT's own.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Verify a written waveform, then draw its frames: PNG, GIF, and the same as text for a screen reader.
+
+    Every frame shows what was wanted beside what is felt. For hello.wav it writes hello.preview.png,
+    hello.preview.gif and hello.preview.txt; with -o pictures/hello, pictures/hello.png and so on.
+
+    \b
+    Example:
+      dotwave preview hello.wav
+    """
+    from ..figures.preview import write_preview
+    from ..verification import verify as check
+
+    report = write_preview(check(Path(out)), output or Path(out).with_suffix(".preview"))
+    _finish(report, as_json, ok=True)
+
+
+@app.command(short_help="List device profiles, or print one.", rich_help_panel=SET_UP)
+def devices(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="One profile, or a YAML file: print every value.", autocompletion=completed_devices),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the built-in device profiles, with the values that are assumed rather than given.
+
+    \b
+    Example:
+      dotwave devices linked-6x6
+    """
+    from .listing import list_devices
+
+    _finish(list_devices(name), as_json, ok=True)
+
+
+@app.command(short_help="List translation tables.", rich_help_panel=SET_UP)
+def tables(
+    wanted: Annotated[
+        str | None, typer.Argument(metavar="FILTER", help="Part of a file name, language or name.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the Braille tables liblouis has: file, language, grade, name.
+
+    \b
+    Example:
+      dotwave tables german
+    """
+    from .listing import list_translation_tables
+
+    _finish(list_translation_tables(wanted), as_json, ok=True)
+
+
+@app.command(short_help="Check this installation.", rich_help_panel=SET_UP)
+def doctor(as_json: Json = False) -> None:
+    """Check Python, the packages, liblouis, the cache and the disk, and name the cure for what is wrong.
+
+    \b
+    Example:
+      dotwave doctor
+    """
+    from .doctor import examine
+
+    report = examine()
+    _finish(report, as_json, ok=report.ok)
+
+
+app.add_typer(picture_app)
+app.add_typer(study_app)
+app.add_typer(plan_app)
+app.add_typer(play_app)
+
+
+def _terminate(number: int, _frame: object) -> NoReturn:
+    raise Terminated(128 + number)
+
+
+def _speak_utf8() -> None:
+    """Start again in UTF-8 where names of files could only be ASCII (a C locale, and Python told to keep to it)."""
+    if sys.getfilesystemencoding() == "ascii":
+        os.execv(sys.executable, [sys.executable, "-X", "utf8", *sys.orig_argv[1:]])
+
+
+def main() -> None:
+    """Entry point: runs the command and turns what went wrong into an exit code."""
+    _speak_utf8()
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _terminate)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # A terminal that cannot show Braille gets escapes, not a traceback.
+            stream.reconfigure(errors="backslashreplace")
+    sys.exit(ended(lambda: app(prog_name="dotwave")))

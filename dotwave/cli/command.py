@@ -1,0 +1,72 @@
+"""What the commands of the command line share: options, and the way a result is printed."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, NoReturn
+
+import typer
+
+from ..errors import AppError
+from ..plain import printable
+from ..reports.report import Report
+from .completion import completed_devices, completed_files
+
+__all__ = [
+    "Budget", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "finish", "printable", "say",
+]  # fmt: skip
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Device = Annotated[
+    str,
+    typer.Option(
+        "--device",
+        "-d",
+        help="A built-in profile or a YAML file; see `dotwave devices`.",
+        autocompletion=completed_devices,
+    ),
+]
+Written = Annotated[
+    str,
+    typer.Argument(
+        metavar="OUT",
+        help="A waveform written by `dotwave text` (.wav or .json).",
+        autocompletion=completed_files(".wav", ".npz", ".csv", ".raw", ".json"),
+    ),
+]
+Tol = Annotated[
+    str | None,
+    typer.Option(help="Largest error of full scale: draft, normal, fine or a number; says what it took."),
+]
+Budget = Annotated[
+    str | None, typer.Option(help="Time for planning, such as 50ms or 2s; says how exact the answer is.")
+]
+Explain = Annotated[bool, typer.Option("--explain", help="Also list which terms of the model are needed, and why.")]
+Pareto = Annotated[
+    str | None,
+    typer.Option(metavar="N|PICTURE|N:PICTURE", help="Also list what frame N (else 1) can be bought for; draw it."),
+]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a file of more than 1 GB.")]
+
+
+def finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
+    """Print a report, as JSON or as text, and end with exit code 0 or 1."""
+    shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
+    say(shown)
+    raise typer.Exit(0 if ok else 1)
+
+
+def say(words: str) -> None:
+    """Print `words` on standard output.
+
+    Raises
+    ------
+    AppError
+        When it cannot take them; a reader that has gone is a BrokenPipeError.
+    """
+    try:
+        typer.echo(printable(words))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise AppError(f"standard output: {error.strerror or error}; send it elsewhere, or free some space") from None

@@ -1,0 +1,177 @@
+"""The commands for pictures, sets of icons and job files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .command import Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
+from .completion import completed_files
+from .help import RENDER
+from .options import SampleFormat
+
+__all__ = ["picture_app"]
+
+picture_app = typer.Typer(rich_markup_mode=None)
+
+PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
+ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
+Contrast = Annotated[
+    float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
+]
+
+
+@picture_app.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
+def image(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="PNG, JPEG, GIF, WebP, BMP, TIFF, SVG.",
+            autocompletion=completed_files(*PICTURES),
+        ),
+    ],
+    device: Device = "paper-6x6",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
+    explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
+    style: Annotated[str | None, typer.Option(help="Defaults for: auto, icon, photo.")] = None,
+    fit: Annotated[str | None, typer.Option(help="contain, cover or stretch.")] = None,
+    kind: Annotated[str | None, typer.Option("--as", help="What a dot can be: on_off, levels, texture.")] = None,
+    threshold: Annotated[str | None, typer.Option(help="otsu, adaptive or fixed.")] = None,
+    invert: Annotated[str | None, typer.Option(help="Raise what is dark: auto, yes, no.")] = None,
+    edges: Annotated[bool, typer.Option("--edges", help="Outlines in place of areas.")] = False,
+    zoom: Annotated[int, typer.Option(help="2 to 16: an overview, then parts of the picture.")] = 1,
+    dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
+    contrast: Contrast = 20.0,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
+    yes: Yes = False,
+    as_json: Json = False,
+) -> None:
+    """Render pictures, one after another, and write the waveforms that make them felt.
+
+    \b
+    Example:
+      dotwave image samples/icons/heart.svg -o heart.wav --explain steps
+    """
+    from ..rendering.image import picture_options, render_images
+    from ..rendering.scene import Rendering
+    from ..request import asked_of
+    from ..studies.study import Study
+
+    options = picture_options(
+        style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
+    )
+    study = Study(asked_of(tol=tol, budget=budget))
+    how = Rendering(output, sample_format.value, contrast, study, yes)
+    report = render_images(files, device=device, options=options, how=how, explain=explain)
+    told = study.told(report, report.ok)
+    finish(told, as_json, ok=told.ok)
+
+
+@picture_app.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
+def icons(
+    sources: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="DIR|GLOB|ARCHIVE...",
+            help="Folders, globs, zip or tar archives.",
+            autocompletion=completed_files(*PICTURES, *ARCHIVES),
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")],
+    device: Device = "paper-6x6",
+    distinct: Annotated[bool, typer.Option("--distinct", help="Choose patterns that are not alike.")] = False,
+    waveforms: Annotated[bool, typer.Option("--waveforms", help="Write a .wav for every icon.")] = False,
+    closer_than: Annotated[int, typer.Option(min=0, help="List pairs that differ in fewer dots.")] = 2,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes side by side; default: all cores.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Work on a dask cluster: tcp://HOST:PORT.")] = None,
+    icon_seconds: Annotated[
+        float, typer.Option(min=0.1, help="Processor time that one icon may take; not with --scheduler.")
+    ] = 20.0,
+    dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
+    contrast: Contrast = 20.0,
+    sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
+    tol: Tol = None,
+    budget: Budget = None,
+    yes: Yes = False,
+    as_json: Json = False,
+) -> None:
+    """Encode and plan every icon; write manifest.json, manifest.csv, contact.png and index.html.
+
+    Stopped in any way, the same call goes on where it was. The exit code is 1 when a file could not be used or a
+    pattern cannot be made; the others are done all the same.
+
+    \b
+    Example:
+      dotwave icons samples/icons -o out/icons --distinct
+    """
+    from ..icon_sets.build import IconOptions, render_icons
+    from ..request import asked_of
+
+    asked = asked_of(tol=tol, budget=budget)
+    options = IconOptions(
+        device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
+        closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
+        tol=asked.tol, budget_s=asked.budget_s, yes=yes, icon_seconds=icon_seconds,
+    )  # fmt: skip
+    report = render_icons(sources, output, options)
+    finish(report, as_json, ok=report.ok)
+
+
+@picture_app.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
+def render(
+    job: Annotated[
+        Path,
+        typer.Argument(
+            metavar="JOB.yaml",
+            help="Device, tolerance, output and a sequence.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    root: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Refuse a job that leads out of this folder; for jobs of others.")
+    ] = None,
+    tol: Tol = None,
+    budget: Budget = None,
+    explain: Explain = False,
+    pareto: Pareto = None,
+    yes: Yes = False,
+    as_json: Json = False,
+) -> None:
+    """Render a sequence of texts, pictures, icons, textures and pauses.
+
+    Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol and --budget come before
+    what the job says. With --root the job, every file it names and its output lie below a folder, links followed, and
+    its tables are liblouis's own.
+
+    \b
+    Example:
+      dotwave render samples/jobs/mixed.yaml
+    """
+    from ..rendering.scene import render_job
+    from ..request import asked_of
+    from ..studies.study import Study
+
+    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
+    report = render_job(job, output, study, root=root, yes=yes)
+    told = study.told(report, report.ok)
+    finish(told, as_json, ok=told.ok)
+
+
+@picture_app.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
+def schema() -> None:
+    """Print the JSON Schema of job files, for editors that complete and check them.
+
+    \b
+    Example:
+      dotwave schema > job.schema.json
+    """
+    from ..jobs.job import job_schema
+
+    say(json.dumps(job_schema(), indent=2))

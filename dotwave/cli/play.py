@@ -1,0 +1,117 @@
+"""The commands that play: on hardware, on a stand-in, and the ports there are."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .command import Device, Json, Written, finish
+from .help import PLAY
+
+__all__ = ["play_app"]
+
+play_app = typer.Typer(rich_markup_mode=None)
+
+
+class BoardModel(StrEnum):
+    """Boards that play by themselves."""
+
+    DRV2667 = "drv2667"
+
+
+class BoardFirmware(StrEnum):
+    """What runs on the board (`drivers.Firmware`, light to import)."""
+
+    TEST_PIXEL = "test-pixel"
+    CORRECTED = "corrected"
+
+
+@play_app.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
+def play(
+    out: Written,
+    port: Annotated[str | None, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")] = None,
+    live: Annotated[bool, typer.Option("--live", help="Really play; without it only the checks are made.")] = False,
+    baud: Annotated[int | None, typer.Option(min=300, help="Bits per second; default: the controller's own.")] = None,
+    patience: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a controller not heard.")] = 10.0,
+    board: Annotated[BoardModel | None, typer.Option(help="A board that plays by itself, instead.")] = None,
+    firmware: Annotated[BoardFirmware, typer.Option(help="What runs on the board.")] = BoardFirmware.TEST_PIXEL,
+    audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
+    channels: Annotated[str, typer.Option("--map", help="Sound card outputs: channel:output,...")] = "",
+    as_json: Json = False,
+) -> None:
+    """Check a written waveform against the safety gate and, with --live, play it.
+
+    Nothing leaves this machine without --live, and nothing at all when a sample is over a limit. Ctrl-C ramps
+    the output to zero. The exit code is 1 when the buffer ran dry or the output was held on the way.
+
+    \b
+    Example:
+      dotwave play hello.wav --port /dev/ttyACM0 --live
+    """
+    from drivers import Firmware
+
+    from ..playing.play import play as run
+
+    report = run(
+        Path(out), live=live, port=port, baud=baud, patience_s=patience, board=board is not None,
+        firmware=Firmware(firmware.value), audio=audio, mapping=channels,
+    )  # fmt: skip
+    finish(report, as_json, ok=report.ok)
+
+
+@play_app.command(short_help="List serial ports.", rich_help_panel=PLAY)
+def ports(as_json: Json = False) -> None:
+    """List the serial ports of this machine.
+
+    \b
+    Example:
+      dotwave ports
+    """
+    from ..playing.play import list_ports
+
+    finish(list_ports(), as_json, ok=True)
+
+
+@play_app.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
+def emulate(
+    device: Device = "paper-6x6",
+    link: Annotated[Path | None, typer.Option(help="A stable name for the port (a symbolic link).")] = None,
+    record: Annotated[Path | None, typer.Option("--record", "-o", help="A .wav for what arrives.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long; default: Ctrl-C.")] = None,
+    once: Annotated[bool, typer.Option("--once", help="Stop when the first session has ended.")] = False,
+    buffer: Annotated[float, typer.Option(help="Seconds the controller can store.")] = 2.0,
+    watchdog: Annotated[float, typer.Option(help="Seconds of silence after which the output is zero.")] = 0.2,
+    drift: Annotated[float, typer.Option(help="Error of its clock in parts per million.")] = 0.0,
+    drop: Annotated[float, typer.Option(min=0, max=1, help="Share of packets lost.")] = 0.0,
+    corrupt: Annotated[float, typer.Option(min=0, max=1, help="Share of packets spoiled.")] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0, max=1, help="Share of packets doubled.")] = 0.0,
+    delay: Annotated[float, typer.Option(min=0, help="Seconds every packet is late.")] = 0.0,
+    stall: Annotated[str | None, typer.Option(help="AT,LENGTH in seconds: packets wait.")] = None,
+    disconnect: Annotated[str | None, typer.Option(help="AT,LENGTH in seconds: the cable is out.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the faults.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Emulate a controller on a pseudo-terminal: play to it from another terminal.
+
+    It shows what is felt as Braille and levels, the buffer, and the faults it makes on request.
+
+    \b
+    Example:
+      dotwave emulate --device linked-6x6 --link /tmp/controller --record arrived.wav
+    """
+    from drivers import Faults
+
+    from ..playing.emulate import emulate as run, parse_window
+
+    faults = Faults(
+        drop=drop, corrupt=corrupt, duplicate=duplicate, delay_s=delay, stall=parse_window(stall, "stall"),
+        disconnect=parse_window(disconnect, "disconnect"),
+    )  # fmt: skip
+    report = run(
+        device=device, link=link, record=record, seconds=seconds, once=once, buffer_s=buffer, watchdog_s=watchdog,
+        drift_ppm=drift, faults=faults, seed=seed,
+    )  # fmt: skip
+    finish(report, as_json, ok=True)

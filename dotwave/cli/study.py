@@ -1,0 +1,104 @@
+"""The commands that study a chain or a device: sweeps, benchmarks, calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .command import Device, Json, finish
+from .completion import completed_files
+from .help import STUDY
+
+__all__ = ["study_app"]
+
+study_app = typer.Typer(rich_markup_mode=None)
+
+
+@study_app.command(short_help="Solve one chain at many settings.", rich_help_panel=STUDY)
+def sweep(
+    chain: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, ranges of its setting, a tolerance.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The .npz or .csv to write.")],
+    only: Annotated[str | None, typer.Option(help="Fields to write, with commas between; default: all.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Also a map of two ranges, as PNG (needs an .npz).")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes side by side.")] = 1,
+    as_json: Json = False,
+) -> None:
+    """Solve a chain at every combination of its ranges, or at every row of a table.
+
+    epsilon, lam and omega are numbers or ranges {from, to, steps, log}, or come from a table (.npz, .csv). Stopped
+    halfway, the same call goes on where it was.
+
+    \b
+    Example:
+      dotwave sweep sweep.yaml -o sweep.npz --picture map.png
+    """
+    from ..figures.sweep_map import draw_map
+    from ..studies.sweep import FIELDS, run_sweep
+
+    fields = FIELDS if only is None else tuple(name.strip() for name in only.split(","))
+    report = run_sweep(chain, output, only=fields, workers=workers)
+    if picture is not None:
+        draw_map(chain, output, picture)
+    finish(report, as_json, ok=True)
+
+
+@study_app.command(short_help="Measure the solvers against others, on this machine.", rich_help_panel=STUDY)
+def bench(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for bench.json and bench.svg.")] = Path(
+        "out/bench"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer settings.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Measure steady states, transients, long chains and maps, and what is installed of their peers, as ratios.
+
+    Needs a source tree: the measurements are in its benchmarks folder.
+
+    \b
+    Example:
+      dotwave bench --quick
+    """
+    from ..studies.bench import run_bench
+
+    finish(run_bench(output, quick=quick), as_json, ok=True)
+
+
+@study_app.command(short_help="Fit the actuators of a device to measured frequency sweeps.", rich_help_panel=STUDY)
+def calibrate(
+    sweep: Annotated[
+        str,
+        typer.Argument(
+            metavar="SWEEP.csv",
+            help="The measured points; - is standard input.",
+            autocompletion=completed_files(".csv"),
+        ),
+    ],
+    device: Device = "linked-6x6",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .yaml to write; none: fit only.")] = None,
+    lam: Annotated[float | None, typer.Option(help="What every link was set to during the sweep.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Fit natural frequency, damping, cubic term and coupling of each actuator, and write a device file.
+
+    SWEEP.csv has the columns row, col, frequency_hz, drive_v, amplitude (of the displacement, over length_m)
+    and phase_rad (negative = lag behind the drive), with up and down sweeps in the order of measuring, at one
+    or more drives. Numbers come with 95 % confidence intervals. The exit code is 1, and nothing is written,
+    when a chain does not fit.
+
+    \b
+    Example:
+      dotwave calibrate samples/calibration/sweep.csv --device linked-6x6 --lam 0.006 -o my-device.yaml
+    """
+    from ..studies.calibrate import calibrate as fit
+
+    report = fit(sweep, device=device, out=output, lam_set=lam)
+    finish(report, as_json, ok=report.ok)

@@ -1,0 +1,3 @@
+"""Pictures of results; whatever they show is also said in words."""
+
+__all__: list[str] = []

@@ -1,0 +1,3 @@
+"""Texts, pictures and scenes to waveforms."""
+
+__all__: list[str] = []

@@ -1,0 +1,314 @@
+"""What `dotwave text` and `dotwave verify` found, as values, as JSON and as text for any reader.
+
+The plain text is made to be listened to: one fact a line, the sentence before the numbers, nothing
+drawn with boxes and nothing said by colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..plain import one_line
+from .plan import PlanReport, plain
+
+__all__ = [
+    "AMPLITUDE_ERROR_LIMIT",
+    "CONTRAST_LIMIT_DB",
+    "DOT_THRESHOLD",
+    "FrameCheck",
+    "Spreading",
+    "TextReport",
+    "VerifyReport",
+    "contrast_between",
+    "decibels",
+    "margin_lines",
+]
+
+Floats = NDArray[np.float64]
+
+DOT_THRESHOLD = 0.5
+"""An actuator counts as a raised dot from this amplitude on, in units of full scale."""
+
+CONTRAST_LIMIT_DB = 12.0
+AMPLITUDE_ERROR_LIMIT = 0.02
+LISTED = 20
+
+
+class Spreading(Protocol):
+    """What a frame becomes under the device's spread, as `planner.FramePlan.spread` has it."""
+
+    @property
+    def expected(self) -> float:
+        """Expected error in units of full scale."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+
+    def lines(self) -> Iterator[str]:
+        """Sentences for a person."""
+
+
+@dataclass(frozen=True)
+class TextReport(PlanReport):
+    """What was rendered and what the planner predicts for it.
+
+    Attributes
+    ----------
+    device : name of the profile. tables : liblouis tables. text : the first characters of the source.
+    frames, pages : how many. duration_s : length of the waveform in seconds.
+    files : what was written; empty when no output was asked for.
+    peak_volts, limit_volts : largest voltage of any channel, and what the amplifier can give.
+    ramp_s : longest way into a frame. error : predicted worst deviation in units of full scale.
+    outcomes : outcome -> number of frames.
+    undefined : characters the table cannot write and what was shown instead.
+    split : words cut at a page's end. differences : what back-translation does not give again.
+    notes : sentences a person should read. seconds : time taken.
+    well : largest deflection over the limit of the softening well, noise_gain : largest magnification of
+        disturbances of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest
+        Floquet multiplier of a wave (all as in `planner.Margins`). spread : of the frame that suffers most.
+    """
+
+    device: str
+    tables: tuple[str, ...]
+    text: str
+    frames: int
+    pages: int
+    duration_s: float
+    files: tuple[str, ...]
+    peak_volts: float
+    limit_volts: float
+    ramp_s: float
+    error: float
+    outcomes: Mapping[str, int]
+    undefined: tuple[str, ...] = ()
+    split: tuple[str, ...] = ()
+    differences: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+    well: float = 0.0
+    noise_gain: float = 1.0
+    slew: float = 0.0
+    multiplier: float = 0.0
+    spread: Spreading | None = None
+
+    def _lines(self) -> Iterator[str]:
+        yield f"Rendered {_count(self.frames, 'frame')} on {_count(self.pages, 'page')} for {self.device}."
+        yield f"Duration: {self.duration_s:.2f} s."
+        yield f"Tables: {', '.join(self.tables)}."
+        yield f"Peak: {self.peak_volts:.1f} V of {self.limit_volts:g} V."
+        yield f"Deflection: at most {100 * self.well:.0f} % of the softening well's limit."
+        if self.noise_gain > 1:
+            yield f"Disturbances of the drive: magnified up to {self.noise_gain:.1g} times more than the drive."
+        yield from margin_lines(self.slew, self.multiplier)
+        yield f"Longest ramp: {self.ramp_s:.3f} s."
+        yield f"Predicted error of the settled patterns: {100 * self.error:.2f} % of full scale."
+        if not self.ok:
+            counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
+            yield f"Not every frame can be made as asked: {counts}."
+        if self.spread is not None:
+            yield from self.spread.lines()
+        yield from _section("Characters the table cannot write", self.undefined)
+        yield from _section("Words split over a page's end", self.split)
+        yield from _section("Differences after back-translation", self.differences)
+        yield from self.notes
+        for name in self.files:
+            yield f"Written: {name}"
+        yield f"Time taken: {self.seconds:.2f} s."
+
+
+@dataclass(frozen=True)
+class FrameCheck:
+    """What one frame of a written waveform does to the skin, from `settled_s` to `end_s`.
+
+    Attributes
+    ----------
+    page : page of the frame. outcome : what the planner said of it.
+    target, felt : float64, shape (rows, cols), amplitude in units of full scale.
+    wrong_dots : actuators felt on the wrong side of the threshold.
+    contrast_db : weakest wanted dot over the strongest unwanted one; None when the frame lacks either, or has levels.
+    amplitude_error : worst deviation from `target`, in units of full scale; of the complex amplitude where phases
+        are wanted, and of the worst tone where there are several.
+    wanted_cells, felt_cells : Unicode Braille, lines separated by a newline. text : the source's span.
+    """
+
+    page: int
+    start_s: float
+    settled_s: float
+    end_s: float
+    outcome: str
+    target: Floats
+    felt: Floats
+    wrong_dots: int
+    contrast_db: float | None
+    amplitude_error: float
+    wanted_cells: str = ""
+    felt_cells: str = ""
+    text: str = ""
+
+    @property
+    def ramp_s(self) -> float:
+        """Length of the way into the frame, seconds."""
+        return self.settled_s - self.start_s
+
+    @property
+    def wanted_dots(self) -> NDArray[np.bool_]:
+        """Which actuators should be felt as raised; bool, shape (rows, cols)."""
+        return self.target >= DOT_THRESHOLD
+
+    @property
+    def felt_dots(self) -> NDArray[np.bool_]:
+        """Which actuators are felt as raised; bool, shape (rows, cols)."""
+        return self.felt >= DOT_THRESHOLD
+
+    @property
+    def ok(self) -> bool:
+        """Right dots, within the limits, and planned as asked; levels asked for with less contrast need none."""
+        exact = self.amplitude_error <= AMPLITUDE_ERROR_LIMIT
+        return self.outcome == "ok" and self.wrong_dots == 0 and self.clear and exact
+
+    @property
+    def clear(self) -> bool:
+        """Dots stand out as far as they should, or no further was planned."""
+        asked = contrast_between(self.wanted_dots, self.target)
+        return self.contrast_db is None or self.contrast_db >= CONTRAST_LIMIT_DB or (asked or 0) < CONTRAST_LIMIT_DB
+
+    def as_dict(self) -> dict[str, Any]:
+        """The check in plain JSON types."""
+        return {name: plain(value) for name, value in vars(self).items()} | {"ok": self.ok}
+
+
+@dataclass(frozen=True)
+class VerifyReport:
+    """What is felt when a written waveform is played, by integrating the full equations under its samples.
+
+    Attributes
+    ----------
+    path : the samples file. device : name of the profile in the manifest.
+    frames : one `FrameCheck` each, in order. samples : how many were integrated.
+    source_text, felt_text : what was rendered, and what the felt cells say when translated back.
+    text_equal : whether they are the same, case and white space apart; None when it is not text.
+    cells_equal : whether the felt cells are those the table writes for the source; decides where a table
+        cannot be translated back. None when it is not text.
+    differences : where they differ. notes : sentences a person should read. seconds : time taken.
+    """
+
+    path: str
+    device: str
+    frames: tuple[FrameCheck, ...]
+    samples: int
+    rate_hz: int
+    source_text: str = ""
+    felt_text: str = ""
+    text_equal: bool | None = None
+    cells_equal: bool | None = None
+    differences: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: float = field(default=0.0)
+
+    @property
+    def wrong_dots(self) -> int:
+        """Wrong dots of all frames together."""
+        return sum(frame.wrong_dots for frame in self.frames)
+
+    @property
+    def contrast_db(self) -> float | None:
+        """The weakest contrast of any frame."""
+        return min((f.contrast_db for f in self.frames if f.contrast_db is not None), default=None)
+
+    @property
+    def amplitude_error(self) -> float:
+        """The worst amplitude error of any frame, in units of full scale (NaN stays NaN)."""
+        return float(np.max([frame.amplitude_error for frame in self.frames], initial=0.0))
+
+    @property
+    def ramp_s(self) -> float:
+        """The longest way into a frame, seconds."""
+        return max((frame.ramp_s for frame in self.frames), default=0.0)
+
+    @property
+    def ok(self) -> bool:
+        """Every frame is right and the text, if any, comes back or is written in the right cells."""
+        readable = self.text_equal is None or self.text_equal or bool(self.cells_equal)
+        return all(frame.ok for frame in self.frames) and readable
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report in plain JSON types, totals first; a number that is not finite becomes null."""
+        totals = {name: plain(getattr(self, name)) for name in _TOTALS}
+        return totals | {name: plain(value) for name, value in vars(self).items()}
+
+    def as_text(self) -> str:
+        """The report as lines of plain text: the verdict, the totals, then only the frames that failed."""
+        return "\n".join(map(one_line, self._lines()))
+
+    def _lines(self) -> Iterator[str]:
+        verdict = "Verified" if self.ok else "Verification failed"
+        yield f"{verdict}: {self.path} on {self.device}, {_count(len(self.frames), 'frame')}."
+        yield f"Wrong dots: {self.wrong_dots}."
+        low = self.contrast_db is not None and self.contrast_db < CONTRAST_LIMIT_DB
+        limit = "the plan asks for no more" if low and all(frame.clear for frame in self.frames) else ""
+        yield f"Lowest contrast: {decibels(self.contrast_db)} ({limit or f'at least {CONTRAST_LIMIT_DB:g} dB wanted'})."
+        worst = f"{100 * self.amplitude_error:.2f} % of full scale"
+        yield f"Worst amplitude error: {worst} (at most {100 * AMPLITUDE_ERROR_LIMIT:g} % wanted)."
+        yield f"Longest ramp: {self.ramp_s:.3f} s."
+        if self.text_equal is not None:
+            yield f"Text felt: {' '.join(self.felt_text.split())}"
+            yield f"Same as the source: {'yes' if self.text_equal else 'no'}."
+        yield from _section("Differences", self.differences)
+        failed = [self._failure(number) for number, frame in enumerate(self.frames, 1) if not frame.ok]
+        yield from _section("Frames that failed", tuple(failed))
+        yield from self.notes
+        yield f"Integrated {self.samples} samples at {self.rate_hz} Hz in {self.seconds:.2f} s."
+
+    def _failure(self, number: int) -> str:
+        frame = self.frames[number - 1]
+        error = f"amplitude error {100 * frame.amplitude_error:.2f} %"
+        dots = f"{_count(frame.wrong_dots, 'wrong dot')}, contrast {decibels(frame.contrast_db)}, {error}"
+        return f"frame {number} at {frame.start_s:.2f} s, outcome {frame.outcome}: {dots}"
+
+
+_TOTALS = ("ok", "wrong_dots", "contrast_db", "amplitude_error", "ramp_s")
+
+
+def margin_lines(slew: float, multiplier: float) -> Iterator[str]:
+    """Sentences on margins that are only told where something vibrates."""
+    if slew > 0:
+        yield f"Slew of the steady drive: at most {100 * slew:.2g} % of the amplifier's."
+    if multiplier > 0:
+        yield f"Stability: largest Floquet multiplier {multiplier:.3f} (below 1 is stable)."
+
+
+def contrast_between(wanted: NDArray[np.bool_], level: Floats) -> float | None:
+    """Weakest wanted dot over strongest unwanted one in decibels.
+
+    Infinite over silence, None when there are no wanted or no unwanted ones.
+    """
+    if not wanted.any() or wanted.all():
+        return None
+    weakest, strongest = np.abs(level[wanted]).min(), np.abs(level[~wanted]).max()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(20 * np.log10(weakest / strongest))
+
+
+def decibels(value: float | None) -> str:
+    """A level for a person; None is a comparison that does not exist; past 100 dB the number means nothing."""
+    if value is None:
+        return "not defined"
+    return "over 100 dB" if value > 100 else f"{value:.1f} dB"
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"
+
+
+def _section(title: str, entries: tuple[str, ...]) -> Iterator[str]:
+    if not entries:
+        return
+    yield f"{title}: {len(entries)}."
+    yield from (f"- {entry}" for entry in entries[:LISTED])
+    if len(entries) > LISTED:
+        yield f"- and {len(entries) - LISTED} more; --json lists them all"

@@ -1,0 +1,232 @@
+"""What a written waveform makes felt: the full equations integrated under the samples in the file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import AsBuilt, Device
+from drivers import FrameMark, Manifest, Role, read_waveform
+from encoders import back_check, covered_text, read_cells
+
+from .progress import progress
+from .reports.text import AMPLITUDE_ERROR_LIMIT, DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
+
+__all__ = ["verify"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+# Forces, links and positions of a block stay near 8 MB each, whatever the grid.
+BLOCK_VALUES = 1 << 20
+# A target between these is a level, neither a raised dot nor a flat one.
+GRADED = (0.3, 0.9)
+
+
+class Felt(NamedTuple):
+    """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
+
+    `level` is what is compared with the target: the mean of a bias pattern, else the amplitude at the
+    drive's frequency, or the sum of those at all its tones. `still` and `moving` are both of them. `error` is the
+    deviation from the target: of the complex amplitude where phases are wanted, of the worst tone where there are
+    several.
+    """
+
+    level: Floats
+    still: Floats
+    moving: Floats
+    error: Floats
+
+
+def verify(path: Path) -> VerifyReport:
+    """Integrate the device's full equations under the samples of `path` and say what is felt.
+
+    Actuators that were measured are what they were measured to be.
+
+    Reads the samples and the manifest beside them, nothing else.
+
+    Raises
+    ------
+    FileError, UnreadableWaveform
+        When the files cannot be used, or the samples are not those the manifest was written for.
+    """
+    began = time.perf_counter()
+    manifest, reader = read_waveform(path)
+    manifest.check_digest(reader.path)
+    integration = _Integration(manifest)
+    with progress("verifying") as update:
+        for block in reader.blocks(integration.block):
+            integration.advance(block)
+            update(integration.position, manifest.samples)
+    checks = [_check(mark, felt) for mark, felt in zip(manifest.frames, integration.felt(), strict=True)]
+    report = VerifyReport(
+        path=str(reader.path),
+        device=manifest.device.name,
+        frames=tuple(checks),
+        samples=manifest.samples,
+        rate_hz=manifest.rate_hz,
+        notes=tuple(integration.notes()),
+    )
+    if manifest.encoding.get("kind") in {"text", "braille"}:
+        report = _with_text(report, manifest)
+    return replace(report, seconds=time.perf_counter() - began)
+
+
+class _Integration:
+    """The grid under the samples, and what each frame collects of its motion while it stands."""
+
+    def __init__(self, manifest: Manifest) -> None:
+        device = manifest.device
+        self._manifest, self._device = manifest, device
+        self.block = max(256, BLOCK_VALUES // (device.rows * device.cols))
+        self._built = AsBuilt(device)
+        self._grid = self._built.integrator(manifest.rate_hz)
+        self._fits = [_Fit(device, mark, manifest.rate_hz) for mark in manifest.frames]
+        self._first = 0
+        self.position = 0
+
+    def advance(self, volts: Floats) -> None:
+        """Take the next block of samples, float64, shape (S, channels), volts."""
+        device, manifest = self._device, self._manifest
+        index = np.arange(self.position, self.position + len(volts))
+        force = np.zeros((len(volts), device.rows, device.cols))
+        for channel in manifest.channels:
+            row, col = channel.row, channel.col or 0
+            driven = channel.role is Role.DRIVE
+            per_volt = self._built.drive_per_volt[row, col] if driven else device.bias_per_volt
+            force[:, row, col] += volts[:, channel.index] * per_volt
+        z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz) * self._built.lam_gain)
+        for fit in self._fits[self._first :]:
+            if fit.first > index[-1]:
+                break
+            fit.take(index, z)
+        while self._first < len(self._fits) and self._fits[self._first].stop <= index[-1] + 1:
+            self._first += 1
+        self.position += len(volts)
+
+    def felt(self) -> Iterator[Felt]:
+        """What each frame makes felt."""
+        for fit in self._fits:
+            yield fit.felt()
+
+    def notes(self) -> Iterator[str]:
+        """What a person should know of the integration."""
+        gone = self._grid.escaped
+        if gone is not None:
+            yield (
+                f"The actuator in row {gone.row}, column {gone.col} left its softening well at "
+                f"{gone.sample / self._manifest.rate_hz:.3f} s; its chain counts as not felt from there on."
+            )
+
+
+class _Fit:
+    """Least squares of 1 and of cos and sin at each row's frequencies over the samples of one frame."""
+
+    def __init__(self, device: Device, mark: FrameMark, rate_hz: int) -> None:
+        self._device, self._mark, self._rate_hz = device, mark, rate_hz
+        self.first = round(mark.settled_s * rate_hz)
+        self.stop = round(mark.end_s * rate_hz)
+        self._rates = [_frequencies(omega, tones) for omega, tones in zip(mark.omega, mark.tones, strict=True)]
+        sizes = [1 + 2 * len(rates) for rates in self._rates]
+        self._gram = [np.zeros((size, size)) for size in sizes]
+        self._load = [np.zeros((size, device.cols)) for size in sizes]
+
+    def take(self, index: NDArray[np.intp], z: Floats) -> None:
+        """Collect the samples of a block that belong to the frame."""
+        inside = slice(*np.searchsorted(index, [self.first, self.stop]))
+        tau = index[inside] / self._rate_hz * self._device.tau_per_s
+        for row, rates in enumerate(self._rates):
+            if row == 0 or rates != self._rates[row - 1]:
+                waves = (wave(rate * tau) for rate in rates for wave in (np.cos, np.sin))
+                basis = np.stack([np.ones_like(tau), *waves])
+            self._gram[row] += basis @ basis.T
+            self._load[row] += basis @ z[inside, row]
+
+    def felt(self) -> Felt:
+        """What is felt; NaN where the frame has too few samples to tell."""
+        full, shape, mark = self._device.full_scale, (self._device.rows, self._device.cols), self._mark
+        if self._gram[0][0, 0] < max(map(len, self._gram)):
+            nothing = np.full(shape, np.nan)
+            return Felt(nothing, nothing, nothing, nothing)
+        still, phasor, moving = np.empty(shape), np.empty(shape, dtype=np.complex128), np.empty(shape)
+        worst = np.empty(shape)
+        for row, (gram, load) in enumerate(zip(self._gram, self._load, strict=True)):
+            parts = np.linalg.lstsq(gram, load)[0] / full
+            count = 1 + len(mark.tones[row])
+            tones = parts[1 : 1 + 2 * count : 2] - 1j * parts[2 : 2 + 2 * count : 2]
+            still[row], phasor[row], moving[row] = parts[0], tones[0], np.abs(tones).sum(axis=0)
+            worst[row] = np.abs(count * np.abs(tones) - mark.target[row]).max(axis=0)
+        standing = ~np.array(mark.moving)
+        worst[standing] = np.abs(still - mark.target)[standing]
+        level = np.where(standing[:, np.newaxis], still, moving)
+        return Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
+
+    def _out_of_phase(self, phasor: Complexes) -> Floats:
+        """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""
+        mark = self._mark
+        wanted = mark.target * np.exp(1j * np.nan_to_num(mark.phase)) * ~np.isnan(mark.phase)
+        away = np.zeros(phasor.shape)
+        for omega in set(mark.omega.tolist()):
+            rows = mark.omega == omega
+            turn = np.exp(1j * np.angle(np.vdot(phasor[rows], wanted[rows])))
+            away[rows] = np.abs(phasor[rows] * turn - wanted[rows])
+        return np.where(np.isnan(mark.phase), 0.0, away)
+
+
+def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
+    """The tones of a row, then the combinations that a cubic spring makes of them beside each."""
+    own = [float(omega), *tones]
+    return own + sorted({2 * one - other for one in own for other in own} - set(own))
+
+
+def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
+    wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
+    # A level wanted at the threshold itself may be felt on either side of it.
+    near = np.abs(felt.level - mark.target) <= AMPLITUDE_ERROR_LIMIT
+    # Between levels there is no such thing as the contrast of dots; the amplitudes are held to all the same.
+    graded = bool(np.any((mark.target > GRADED[0]) & (mark.target < GRADED[1])))
+    return FrameCheck(
+        page=mark.page,
+        start_s=mark.start_s,
+        settled_s=mark.settled_s,
+        end_s=mark.end_s,
+        outcome=str(mark.outcome),
+        target=mark.target,
+        felt=felt.level,
+        wrong_dots=int(np.count_nonzero(((wanted != present) & ~near) | np.isnan(felt.level))),
+        contrast_db=None if graded else contrast_between(wanted, felt.level),
+        amplitude_error=float(np.max(felt.error)),
+        wanted_cells=mark.cells,
+        text=mark.text,
+    )
+
+
+def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
+    """Read the felt dots of each page as cells, and translate them back."""
+    encoding = manifest.encoding
+    checks: list[FrameCheck] = []
+    pages: list[str] = []
+    for _, parts in groupby(report.frames, key=lambda check: check.page):
+        together = list(parts)
+        cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
+        pages.append(cells)
+        checks += [replace(check, felt_cells=cells) for check in together]
+    source = covered_text((mark.span, mark.text) for mark in manifest.frames)
+    check = back_check(pages, source, encoding)
+    return replace(
+        report,
+        frames=tuple(checks),
+        source_text=source,
+        felt_text=check.back,
+        text_equal=check.text_equal,
+        cells_equal=check.cells_equal,
+        differences=tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences),
+        notes=(*report.notes, check.sentence),
+    )
