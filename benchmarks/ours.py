@@ -21,7 +21,8 @@ from problem import CHAIN, PERIODS, median_error, settings
 
 from chainsim import Chain, Setting, solve
 from chainsim.batch.sweep import OUTCOMES, sweep
-from chainsim.time_domain.scaled import in_threads, scaled
+from chainsim.equations.scaled_chain import ScaledChain
+from chainsim.threads import in_threads
 from chainsim.time_domain.splitting import WIDTH, advance_block, forcing_table
 
 __all__ = ["ALONE", "lengths", "map_of_settings", "one_alone", "states_after", "steady", "timed", "transients"]
@@ -86,9 +87,9 @@ def one_alone() -> dict[str, Any]:
 
 def states_after(size: int, steps: int, periods: int = PERIODS) -> NDArray[np.float64]:
     """States (z, v) of `size` chains that start from rest, by the splitting kernel on all cores."""
-    problem = scaled(CHAIN, settings(size))
+    scaled = ScaledChain.of(CHAIN, settings(size))
     state, peak, lanes = np.zeros((size, 2 * CHAIN.n)), np.zeros(size), np.arange(size)
-    table, system = forcing_table(steps), problem.system
+    table, system = forcing_table(steps), scaled.network.plain
 
     def work(part: slice) -> None:
         advance_block(state, lanes[part], system, table, 0, steps * periods, peak)

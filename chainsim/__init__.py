@@ -6,20 +6,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .complaints import complaint_of, shown, words_of
+from .equations.chain import Chain, Setting, Spread
+from .equations.coupling import Closure, CouplingKind
 from .errors import ChainError, ProfileError
 from .model.calibrated import Actuator, ActuatorSpread
-from .model.chain import Chain, Closure, CouplingKind, Setting, Spread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
 from .npy_header import NpyHeader, read_npy_header
-from .rung import RUNGS, Rung, RungError, Start, load_rung
+from .rung import RUNGS, TERMS, Rung, RungError, Start, load_rung
 from .yamlfile import Located, parse_model, read_located, read_model
 
 if TYPE_CHECKING:
     from .averaging.decide import Decision, decide
     from .averaging.envelope import follow
     from .batch.sweep import SweepResult, sweep, unit_of
-    from .continuation.continuation import continue_branch
+    from .continuation.path import continue_branch
     from .continuation.spectrum import (
         critical_lam,
         delta_from_critical_lam,
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
     from .effects.tones import two_tones
     from .files.simulation import Simulation, parse_simulation, read_simulation, simulate
     from .files.sweep import SettingSweep, read_sweep
-    from .harmonic_balance.harmonic_balance import balance_near
     from .harmonic_balance.joint_branches import Branches, joint_branches
+    from .harmonic_balance.rung import balance_near
     from .harmonic_balance.sensitivity import Gradient, gradient
     from .reach.ladder import solve
     from .time_domain.as_built import AsBuilt
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "RUNGS",
+    "TERMS",
     "Actuator",
     "ActuatorSpread",
     "Amplifier",
@@ -155,7 +157,7 @@ _LATE = {
     "spectrum_curve": "continuation.spectrum",
     "delta_from_critical_lam": "continuation.spectrum",
     "critical_lam": "continuation.spectrum",
-    "continue_branch": "continuation.continuation",
+    "continue_branch": "continuation.path",
     "SettingSweep": "files.sweep",
     "read_sweep": "files.sweep",
     "SweepResult": "batch.sweep",
@@ -167,7 +169,7 @@ _LATE = {
     "GridIntegrator": "time_domain.integrate",
     "Reached": "time_domain.ode",
     "Simulation": "files.simulation",
-    "balance_near": "harmonic_balance.harmonic_balance",
+    "balance_near": "harmonic_balance.rung",
     "gradient": "harmonic_balance.sensitivity",
     "parse_simulation": "files.simulation",
     "reached_from_rest": "time_domain.ode",

@@ -9,21 +9,24 @@ from typing import ClassVar
 
 import numpy as np
 
+from .equations.chain import Chain, Setting
 from .errors import ChainError
-from .model.chain import Chain, Setting
 from .model.response import Response
 
-__all__ = ["MAX_PERIODS", "RUNGS", "Rung", "RungError", "Start", "load_rung"]
+__all__ = ["MAX_PERIODS", "RUNGS", "TERMS", "Rung", "RungError", "Start", "load_rung"]
 
 RUNGS = {
     "static": ("chainsim.harmonic_balance.static", "StaticRung"),
     "linear": ("chainsim.harmonic_balance.linear", "LinearRung"),
     "one_harmonic": ("chainsim.harmonic_balance.one_harmonic", "OneHarmonicRung"),
-    "harmonic_balance": ("chainsim.harmonic_balance.harmonic_balance", "HarmonicBalanceRung"),
+    "harmonic_balance": ("chainsim.harmonic_balance.rung", "HarmonicBalanceRung"),
     "envelope": ("chainsim.averaging.rung", "EnvelopeRung"),
     "ode": ("chainsim.time_domain.ode", "OdeRung"),
 }
+"""Name -> module and class, the cheapest first. A module is imported when its rung is asked for."""
 
+TERMS = frozenset({"nonlinearity", "third harmonic", "preload"})
+"""Terms of a steady state that a rung may have beside the linear chain's."""
 
 MAX_PERIODS = 60_000
 """Drive periods of the full equations after which a setting is out of budget: 75 e-folds at Q = 250."""
@@ -52,8 +55,12 @@ class Rung(ABC):
     1. `name`, the key under which it stands in `RUNGS` and which it writes into `Response.rung`;
     2. `order`, in words, how its error falls and in what; a test fits the slope;
     3. `valid`, in words, where it is true;
-    4. `refusal`, one sentence why it cannot answer this question, or "" when it can;
-    5. `steady`, the work itself.
+    4. `models`, which terms of the equation it has, of those in `TERMS`;
+    5. `lists_branches`, whether start ``all`` gives every branch; False unless said;
+    6. `refusal`, one sentence why it cannot answer this question, or "" when it can;
+    7. `steady`, the work itself;
+
+    and a line in `RUNGS`, at the place that its price gives it.
 
     The base does the rest: `solve` raises the refusal as a `RungError`. Never override `solve`.
 
@@ -70,6 +77,8 @@ class Rung(ABC):
     name: ClassVar[str]
     order: ClassVar[str]
     valid: ClassVar[str]
+    models: ClassVar[frozenset[str]]
+    lists_branches: ClassVar[bool] = False
 
     @abstractmethod
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chainsim import Device, Outcome
+from chainsim import Device, Outcome, load_rung
 from encoders import TargetPattern
 from planner import FramePlan, Plan
 
@@ -27,14 +27,6 @@ __all__ = ["Study", "Told"]
 USUAL_TOL = 1e-2
 # Frames that bring no chain not met before are not looked at again, and no more than so many chains are.
 MOST_CHAINS = 64
-# Terms that each rung has; the way in, which a plan has, is in none.
-MODELLED = {
-    "static": {"nonlinearity", "third harmonic", "preload"},
-    "linear": set[str](),
-    "one_harmonic": {"nonlinearity"},
-    "harmonic_balance": {"nonlinearity", "third harmonic", "preload"},
-    "ode": {"nonlinearity", "third harmonic", "preload"},
-}
 
 
 class Study:
@@ -185,7 +177,9 @@ class Study:
     def _left(self, rung: str, device: Device) -> str:
         """What a rung leaves out of this scene."""
         terms = self._required(device, self.asked.tol or USUAL_TOL).terms
-        lacking = {term.name: term.effect for term in terms if term.name not in MODELLED[rung] | {"transients"}}
+        # The way in, which a plan has, is in no rung.
+        modelled = load_rung(rung).models | {"transients"}
+        lacking = {term.name: term.effect for term in terms if term.name not in modelled}
         listed = [f"{name} {_size(effect)}" for name, effect in lacking.items() if effect > 0]
         return f"left out of it: {', '.join(listed)}" if listed else "nothing is left out of it"
 

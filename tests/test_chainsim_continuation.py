@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, Setting, solve
 from chainsim.averaging.settle import reached
-from chainsim.continuation.continuation import ContinuationError, Ending, continue_branch
+from chainsim.continuation.path import ContinuationError, Ending, continue_branch
 
 
 def folds_in_epsilon(delta, omega):

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from chainsim import Chain, Outcome, RungError, Setting, reached_from_rest, solve, steady_from_rest
 from chainsim.averaging.envelope import EnvelopeError, follow, slow_refusal
-from chainsim.averaging.linear import coupling, exponential, solvent
+from chainsim.averaging.linear import exponential, solvent
 from chainsim.averaging.rung import EnvelopeRung
 from chainsim.reach.rest import sure_from_rest
 from chainsim.rung import Start
@@ -24,7 +24,7 @@ def transient_error(eta, closure, rows, bias):
     setting = Setting.of(
         chain, epsilon=0.5 * eta**1.5, lam=0.6 * eta, omega=omega, bias=bias * eta**0.5, **down
     )  # fmt: skip
-    spring = coupling(chain, setting, setting.lam)[0] + np.eye(4)
+    spring = chain.law.matrix(setting.lam, setting.lam_y)[0] + np.eye(4)
 
     def slope(at, y):
         pull = -spring @ y[:4] - chain.delta * y[4:] + y[:4] ** 3 + setting.bias[0]
@@ -138,7 +138,7 @@ def test_the_exponential_is_scipys(n, seed, size):
 def test_the_solvents_split_every_linear_motion(closure, lam, omega, n):
     chain = Chain.of(n, delta=np.linspace(0.01, 0.3, n), beta=0.0, stiffness=np.linspace(0.9, 1.2, n), closure=closure)
     setting = Setting.of(chain, epsilon=0, lam=lam, omega=omega)
-    spring = coupling(chain, setting, setting.lam) + np.diag(chain.stiffness)
+    spring = chain.law.matrix(setting.lam, setting.lam_y) + np.diag(chain.stiffness)
     delta = np.broadcast_to(chain.deltas, (1, n))
     damping, stiff = 2j * omega + delta, spring - omega**2 * np.eye(n) + 1j * omega * np.diag(delta[0])
     own = np.diagonal(spring, axis1=1, axis2=2)

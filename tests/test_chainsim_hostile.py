@@ -248,7 +248,8 @@ def energy(z, v, beta):
 
 @pytest.mark.slow
 def test_energy_stays_bounded_over_a_million_periods():
-    from chainsim.time_domain.network import Network, advance_network
+    from chainsim.equations.views import Network
+    from chainsim.time_domain.network import advance_network
     from chainsim.time_domain.splitting import forcing_table
 
     one, nothing = np.ones((1, 1)), np.zeros((1, 1))

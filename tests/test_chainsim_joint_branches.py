@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chainsim import Chain, Outcome, RungError, Setting, solve
 from chainsim.equations.basis import basis_for
-from chainsim.equations.scaling import Stages
+from chainsim.equations.scaled_chain import ScaledChain
 from chainsim.harmonic_balance.joint import newton_joint
 from chainsim.harmonic_balance.joint_branches import joint_branches
 from chainsim.harmonic_balance.joint_roots import roots_of
@@ -27,13 +27,13 @@ def listed(chain, setting, rung="harmonic_balance", tol=1e-7):
 
 def by_chance(chain, setting, count, seed):
     """Single-harmonic answers (n, B) that Newton finds from random starts of any size and phase."""
-    stages, basis, rng = Stages.of(chain, setting), basis_for(1, False), np.random.default_rng(seed)
+    scaled, basis, rng = ScaledChain.of(chain, setting), basis_for(1, False), np.random.default_rng(seed)
     start = np.empty((chain.n, 2, count))
     size = 0.6 * 10 ** rng.uniform(-2.5, 0, (chain.n, count))
     angle = rng.uniform(0, 2 * np.pi, (chain.n, count))
     start[:, 0], start[:, 1] = size * np.cos(angle), size * np.sin(angle)
     with np.errstate(all="ignore"):
-        solved = newton_joint(stages.pick(np.zeros(count, dtype=np.intp)), basis, start)
+        solved = newton_joint(scaled.pick(np.zeros(count, dtype=np.intp)), basis, start)
     found = []
     for phasor in (solved.x[:, 0] + 1j * solved.x[:, 1])[:, solved.ok].T:
         if all(np.abs(phasor - other).max() > 1e-5 * np.abs(phasor).max() for other in found):
@@ -100,7 +100,7 @@ def positive_roots(polynomial):
 def test_two_oscillators_have_the_roots_of_their_polynomial(closure, epsilon, lam, omega, beta):
     """|D|^2 = epsilon^2 is of degree 9 in s = |A_2|^2; its positive roots, counted exactly, are the answers."""
     chain = Chain(2, DELTA, beta, closure)
-    found = roots_of(Stages.of(chain, Setting.of(chain, epsilon=epsilon, lam=lam, omega=omega)))
+    found = roots_of(ScaledChain.of(chain, Setting.of(chain, epsilon=epsilon, lam=lam, omega=omega)))
     exact = [Fraction(each) for each in (lam, omega, DELTA, beta, epsilon)]
     lam, omega, delta, beta, epsilon = exact
     re, im = [1 + lam - omega**2, 3 * beta / 4], [delta * omega]  # K_2 in powers of s

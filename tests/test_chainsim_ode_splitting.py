@@ -8,7 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from chainsim.equations.composition import FLOWS, KICK_TIMES, KICKS
-from chainsim.time_domain.splitting import System, advance_block, flow, forcing_table
+from chainsim.equations.views import PlainNetwork
+from chainsim.time_domain.splitting import advance_block, flow, forcing_table
 
 
 def transient(
@@ -20,7 +21,7 @@ def transient(
         links[:, 0] = 0.0
     state, peak = np.zeros((lanes, 2 * n)), np.zeros(lanes)
     drive, period = np.tile([epsilon, 0.0], (lanes, 1)), np.full(lanes, 2 * np.pi / omega)
-    system = System(links, np.zeros((lanes, n)), drive, period, delta, beta, ring)
+    system = PlainNetwork(links, np.zeros((lanes, n)), drive, period, delta, beta, ring)
     advance_block(state, np.arange(lanes), system, forcing_table(steps), 0, steps * periods, peak)
     state[:, n:] -= 0.5 * delta * state[:, :n]
     return state

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import RUNGS, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
+from chainsim import RUNGS, TERMS, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
 
 CHAIN = Chain(3, 0.05, -1.0)
 
@@ -40,13 +40,13 @@ def test_static_error_falls_with_the_square_of_the_drive():
 
 def test_harmonic_balance_is_geometric_in_the_harmonics_it_keeps():
     from chainsim.equations.basis import basis_for
-    from chainsim.equations.scaling import Stages
+    from chainsim.equations.scaled_chain import ScaledChain
     from chainsim.harmonic_balance.march import march
 
     chain = Chain(1, 0.1, 1.0)
-    stages = Stages.of(chain, Setting.of(chain, epsilon=1.0, lam=0, omega=1.1))
-    truth = march(stages, basis_for(33, False)).x[0, :2, 0]
-    errors = [np.abs(march(stages, basis_for(order, False)).x[0, :2, 0] - truth).max() for order in (1, 3, 5, 9)]
+    scaled = ScaledChain.of(chain, Setting.of(chain, epsilon=1.0, lam=0, omega=1.1))
+    truth = march(scaled, basis_for(33, False)).x[0, :2, 0]
+    errors = [np.abs(march(scaled, basis_for(order, False)).x[0, :2, 0] - truth).max() for order in (1, 3, 5, 9)]
     assert all(later < 0.1 * sooner for sooner, later in pairwise(errors))
 
 
@@ -88,12 +88,17 @@ def test_auto_takes_the_cheapest_rung_that_meets_the_tolerance():
     assert solve(CHAIN, still, tol=1e-6).rung == "static"
 
 
+FEW = Setting.of(CHAIN, epsilon=1e-3, lam=0.2, omega=1.2)
+
+
 @pytest.mark.parametrize("name", list(RUNGS))
 def test_every_rung_states_its_claims(name):
     rung = load_rung(name)
     assert rung.name == name
     assert rung.order
     assert rung.valid
+    assert rung.models <= TERMS
+    assert rung.lists_branches == (rung.refusal(CHAIN, FEW, Start.ALL) == "" and name != "linear")
     assert rung.refusal(CHAIN, Setting.of(CHAIN, epsilon=1e-3, lam=0.2, omega=1.2), Start.REST) == ""
 
 

@@ -58,9 +58,9 @@ def test_a_changed_helper_is_a_changed_kernel():
     from chainsim.time_domain.linked_kernels import advance_linked
 
     assert {name for name, _, _ in sources_stamp(march_blocks.py_func)} == {
-        "fast_balance.py", "fast_chain.py", "fast_floquet.py",
+        "balance.py", "chains.py", "multipliers.py",
     }  # fmt: skip
     for name, changed, size in sources_stamp(advance_linked.py_func):
-        stat = (Path(__file__).parent.parent / "chainsim" / "motion" / name).stat()
+        stat = (Path(__file__).parent.parent / "chainsim" / "time_domain" / name).stat()
         assert (changed, size) == (stat.st_mtime_ns, stat.st_size)
     assert march_blocks._cache._cache_file._source_stamp == sources_stamp(march_blocks.py_func)

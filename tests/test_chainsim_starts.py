@@ -5,7 +5,7 @@ import pytest
 
 from chainsim import Branch, Chain, Outcome, Setting, reached_from_rest, solve
 from chainsim.averaging.decide import decide
-from chainsim.reach.envelope_ramp import from_ramp
+from chainsim.reach.ramp import from_ramp
 from chainsim.reach.rest import sure_from_rest
 from chainsim.rung import Start
 from chainsim.time_domain.ode import steady_from_ramp

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Stats
 from ..rung import Start
 from .envelope import slow_refusal

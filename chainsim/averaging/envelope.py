@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..equations.chain import Chain, Setting
 from ..errors import ChainError
-from ..model.chain import Chain, Closure, CouplingKind, Setting
 from ..model.response import Outcome, Stats
 from .flow import SlowFlow
 from .steps import Steps
@@ -110,7 +110,7 @@ def slow_refusal(chain: Chain, setting: Setting) -> str:
     """Why the slow flow is not true of this system, in one sentence that names the cure; "" when it can be."""
     if not chain.deltas.max() < 1:
         return f"delta {chain.deltas.max()} is no small damping, so nothing is slow; use rung ode"
-    if bool((_stiffness(chain, setting, setting.lam) <= 0.3).any()):
+    if bool((chain.law.stiffness(chain.stiffness, setting.lam, setting.lam_y) <= 0.3).any()):
         return "an oscillator has a stiffness of 0.3 or less, so nothing is slow; use rung ode"
     return ""
 
@@ -120,18 +120,9 @@ def hilltop(chain: Chain, setting: Setting, lam: Floats) -> Floats:
 
     lam : float64, shape (..., n), links in place of those of the setting.
     """
-    stiffness = _stiffness(chain, setting, lam)
+    stiffness = chain.law.stiffness(chain.stiffness, lam, setting.lam_y)
     soft = chain.betas < 0
     return np.where(soft, np.sqrt(np.maximum(stiffness, 0) / np.where(soft, -chain.betas, 1.0)), np.inf)
-
-
-def _stiffness(chain: Chain, setting: Setting, lam: Floats) -> Floats:
-    if chain.kind is CouplingKind.AMPLIFIER:
-        return chain.stiffness + 0 * lam
-    own: Floats = chain.stiffness + lam
-    if chain.closure is Closure.BIDIRECTIONAL:
-        own[..., :-1] += lam[..., 1:]
-    return own if setting.lam_y is None else own + setting.lam_y
 
 
 @dataclass(frozen=True)
@@ -161,7 +152,7 @@ class _Course:
         links = links[:, None] if links.ndim == 2 and lam is not None else links
         if not (np.isfinite(drive).all() and np.isfinite(links).all()):
             raise EnvelopeError("epsilon, lam: expected finite numbers")
-        if lam is not None and chain.closure is Closure.OPEN and links[..., 0].any():
+        if lam is not None and not chain.law.closed and links[..., 0].any():
             raise EnvelopeError("lam: the first oscillator of an open chain has no link; set lam[..., 0] to 0")
         return cls(times, np.broadcast_to(drive, (count, size)), np.broadcast_to(links, (count, size, n)))
 

@@ -54,14 +54,14 @@ def rates_at(flow: SlowFlow, amplitude: Complexes) -> Complexes:
     here = flow.pick(known)
     bend, each = _bend(here, amplitude[known]), np.arange(n)
     parts = [_real(here.rate), _real(here.weight), _real(here.slave), bend]
-    if flow.turns:
+    if flow.law.feed_forward:
         pair = np.stack([each, n + each], axis=1)
         rate, weight, slave, bend = (part[:, pair[:, :, None], pair[:, None, :]] for part in parts)
     else:
         rate, weight, slave, bend = parts
     one = np.eye(rate.shape[-1])
     slope = rate - weight @ bend @ np.linalg.inv(one + slave @ bend)
-    values[known] = _pairs(slope).reshape(len(known), -1) if flow.turns else np.linalg.eigvals(slope)
+    values[known] = _pairs(slope).reshape(len(known), -1) if flow.law.feed_forward else np.linalg.eigvals(slope)
     return values
 
 

@@ -8,7 +8,7 @@ mean C, second harmonic E and third harmonic B, every oscillator obeys
     C = -(k + ..)^-1 (3/2) beta z0 |A|^2, E = -(.. - 4 omega^2 + 2 i delta omega)^-1 (3/2) beta z0 A^2,
     B = -((beta/4) A^3 + 3 beta z0 A E)/(k + .. - 9 omega^2 + 3 i delta omega).
 
-Order 1 drops A'' and B. Order 2 splits A = a + c as `envelope_linear` does, exactly in all that is linear: a turns
+Order 1 drops A'' and B. Order 2 splits A = a + c as `linear` does, exactly in all that is linear: a turns
 slowly, c follows its drive. Nothing faster than the detuning is left to integrate, and both orders have the exact fixed
 points of their balance.
 """
@@ -21,8 +21,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.chain import Chain, Closure, CouplingKind, Setting
-from .linear import coupling, diagonal, inverse, solvent, times
+from ..equations.chain import Chain, Setting
+from ..equations.coupling import CouplingLaw
+from .linear import diagonal, inverse, solvent, times
 
 __all__ = ["Lean", "SlowFlow"]
 
@@ -59,8 +60,7 @@ class SlowFlow:
     Attributes
     ----------
     beta : float64, shape (n,) or (1,), of the chain. omega : float64, shape (N, 1).
-    back : 1 where a link also pulls its receiver back (resistor), 0 where not (amplifier).
-    both : whether a link acts both ways. turns : whether no oscillator acts on one before it.
+    law : who feeds whom.
     lam : float64, shape (N, n), links about which the linear part is exact.
     rate, weight, fast, slave : complex128, shape (N, n, n), S, W, R and R^-1 W (0 in order 1).
     stiff : complex128, shape (N, n, n), Z. third : complex128, shape (N, n), what turns the drive of B into B; 0 in
@@ -69,9 +69,7 @@ class SlowFlow:
     """
 
     beta: Floats
-    back: float
-    both: bool
-    turns: bool
+    law: CouplingLaw
     omega: Floats
     lam: Floats
     rate: Complexes
@@ -89,7 +87,7 @@ class SlowFlow:
         n = lam.shape[1]
         delta, beta = np.broadcast_to(chain.deltas, lam.shape), chain.betas
         omega = setting.omega[:, None]
-        spring = coupling(chain, setting, lam) + diagonal(np.broadcast_to(chain.stiffness, lam.shape).copy())
+        spring = chain.law.matrix(lam, setting.lam_y) + diagonal(np.broadcast_to(chain.stiffness, lam.shape).copy())
         lean = _lean(setting, spring, beta, delta)
         if lean is not None:
             spring = spring + diagonal(lean.kappa * lean.place)
@@ -97,8 +95,7 @@ class SlowFlow:
         own, damping = spring[:, each, each], np.asarray(2j * omega + delta, dtype=np.complex128)
         stiff = spring + diagonal(np.asarray(1j * delta * omega - omega**2, dtype=np.complex128))
         third = np.asarray((order == 2) / (9 * omega**2 - own - 3j * delta * omega), dtype=np.complex128)
-        nature = (float(chain.kind is CouplingKind.RESISTOR), chain.closure is Closure.BIDIRECTIONAL)
-        head = (beta, *nature, chain.feed_forward, omega, lam)
+        head = (beta, chain.law, omega, lam)
         if order == 1:
             weight, none = diagonal(1 / damping), np.zeros(spring.shape, dtype=np.complex128)
             return cls(*head, -weight @ stiff, weight, none, none, stiff, third, lean, 0)
@@ -159,10 +156,7 @@ class SlowFlow:
         """G without the drive."""
         push = -self.cubic(amplitude)
         if lam is not self.lam:
-            more = lam - self.lam
-            push += more * (np.roll(amplitude, 1, axis=1) - self.back * amplitude)
-            if self.both:
-                push[:, :-1] += more[:, 1:] * (amplitude[:, 1:] - amplitude[:, :-1])
+            self.law.pull(push, amplitude, lam - self.lam)
         return push
 
     def amplitude(self, slow: Complexes, drive: Complexes, lam: Floats) -> Complexes:

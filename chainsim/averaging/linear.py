@@ -12,10 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations.scaling import second_links
-from ..model.chain import Chain, Closure, CouplingKind, Setting
-
-__all__ = ["coupling", "diagonal", "exponential", "inverse", "solvent", "times"]
+__all__ = ["diagonal", "exponential", "inverse", "solvent", "times"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -24,27 +21,6 @@ Numbers = TypeVar("Numbers", Floats, Complexes)
 ROUNDS = 200
 SETTLED = 1e-14
 DEGREE = 14  # Of the Taylor polynomial of e^x: 0.5^15/15! is below rounding.
-
-
-def coupling(chain: Chain, setting: Setting, lam: Floats) -> Floats:
-    """What the links `lam` (N, n) do, less nothing of the oscillators themselves; float64, shape (N, n, n).
-
-    Row m is the stiffness that links add to oscillator m, and minus their pulls on it.
-    """
-    n = lam.shape[1]
-    matrix = np.zeros((len(lam), n, n))
-    each = np.arange(n)
-    other, stride = second_links(chain, setting)
-    links = [(lam, -1)]
-    if chain.closure is Closure.BIDIRECTIONAL:
-        links.append((np.concatenate([lam[:, 1:], np.zeros((len(lam), 1))], axis=1), 1))
-    elif other is not None:
-        links.append((other, stride))
-    for strength, step in links:
-        matrix[:, each, (each + step) % n] -= strength
-        if chain.kind is CouplingKind.RESISTOR:
-            matrix[:, each, each] += strength
-    return matrix
 
 
 def solvent(damping: Complexes, matrix: Complexes, root: Complexes) -> Complexes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..rung import Start
 from .envelope import EnvelopeError, hilltop
 from .flow import SlowFlow

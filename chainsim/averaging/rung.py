@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import basis_for
-from ..equations.scaling import Stages
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.answer import defect
 from ..harmonic_balance.march import branches_of
-from ..model.chain import Chain, Setting
 from ..model.response import Outcome, Response
-from ..rung import Rung, Start
+from ..rung import TERMS, Rung, Start
 from .envelope import slow_refusal
 from .flow import SlowFlow
 from .linear import times
@@ -33,6 +33,7 @@ class EnvelopeRung(Rung):
     name = "envelope"
     order = "2 in delta, lam, detuning and beta a^2 for a transient; a steady state to O(beta^2 a^4), with bias O(a^3)"
     valid = "delta, lam, detuning, beta a^2 << 1, and beta z0 a << 1 about an equilibrium z0; transients and slow beats"
+    models = TERMS
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Strong damping, soft oscillators, too many of them, every branch."""
@@ -50,16 +51,16 @@ class EnvelopeRung(Rung):
         arrival = reached(chain, setting, start=start)
         ok = arrival.outcome == Outcome.OK
         harmonics, mean = _series(chain, setting, arrival)
-        stages = Stages.of(chain, setting)
-        basis = basis_for(3, stages.has_mean)
-        x = basis.coordinates(harmonics.transpose(1, 2, 0), mean.T).transpose(1, 0, 2) * stages.length
+        scaled = ScaledChain.of(chain, setting)
+        basis = basis_for(3, scaled.has_mean)
+        x = basis.coordinates(harmonics.transpose(1, 2, 0), mean.T).transpose(1, 0, 2) * scaled.length
         estimate = np.full(len(setting), np.inf)
         if ok.any():
-            estimate[ok] = defect(stages.pick(ok), basis, x[:, :, ok])
+            estimate[ok] = defect(scaled.pick(ok), basis, x[:, :, ok])
         outcome = arrival.outcome.copy()
         outcome[ok & ~(estimate <= tol)] = Outcome.OUT_OF_BUDGET
         multipliers = np.exp(arrival.rates * setting.period[:, None]).reshape(len(setting), setting.n, 2)
-        branch = np.ascontiguousarray(branches_of(stages, basis, x).T)
+        branch = np.ascontiguousarray(branches_of(scaled, basis, x).T)
         for array in (outcome, harmonics, mean, multipliers, branch, estimate, ok):
             array.flags.writeable = False
         stats = replace(arrival.stats, oscillators_solved=len(setting) * setting.n, seconds=time.perf_counter() - began)

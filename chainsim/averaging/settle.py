@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Stats
 from ..rung import Start
 from .envelope import EnvelopeError, slow_refusal

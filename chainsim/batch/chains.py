@@ -159,7 +159,7 @@ def march_blocks(given: Given, found: Found, table: Floats, first: int, last: in
 
     Parameters
     ----------
-    table : `fast_floquet.nodes`. found : `largest` has to be 0 and `estimate` is set; NaN marks a setting whose
+    table : `multipliers.nodes`. found : `largest` has to be 0 and `estimate` is set; NaN marks a setting whose
         correction did not converge, its other entries are meaningless then.
     """
     block = np.zeros(ROWS)

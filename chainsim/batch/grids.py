@@ -76,7 +76,7 @@ def march_grids(given: Given, downs: Floats, cols: int, found: Found, table: Flo
 
     Parameters
     ----------
-    downs : float64, shape (N, n), links from above, as `Setting.lam_y`. The rest as in `fast_chain.march_blocks`.
+    downs : float64, shape (N, n), links from above, as `Setting.lam_y`. The rest as in `chains.march_blocks`.
     """
     rows = given.lam.shape[1] // cols
     block = np.zeros(ROWS)

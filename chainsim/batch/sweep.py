@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.chain import Chain, CouplingKind, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Response, Stats
 from ..reach.ladder import solve
 from ..reach.rest import sure_from_rest
-from ..time_domain.scaled import in_threads
+from ..threads import in_threads
 from .balance import WIDTH
 from .chains import Found, Given, march_blocks
 from .deep import ORDERS, Tables, march_deep, tables_for
@@ -128,8 +128,9 @@ def sweep(chain: Chain, setting: Setting, *, tol: float, from_rest: bool) -> Swe
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
     began = time.perf_counter()
-    alike = chain.spread is None and chain.kind is CouplingKind.RESISTOR and chain.feed_forward
-    if not alike or setting.preload.any() or setting.bias.any():
+    alike = chain.spread is None and bool(chain.law.back)
+    compiled = alike and (chain.law.in_line or chain.rows > 1)
+    if not compiled or setting.preload.any() or setting.bias.any():
         answer = _blank(len(setting), chain.n)
         rung = "auto" if from_rest else "harmonic_balance"
         _fill(answer, chain, setting, np.arange(len(setting)), tol, rung)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..averaging.settle import reached
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome
 from ..rung import Start
 

@@ -11,12 +11,15 @@ eigenvalues a curve, the asymptotic continuous spectrum (Yanchuk and Wolfrum, SI
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..errors import ChainError
-from ..model.chain import Chain, Closure, Setting
+from ..floquet.monodromy import rest_matrix
 
 __all__ = [
     "SpectrumError",
@@ -46,19 +49,13 @@ def rest_eigenvalues(chain: Chain, setting: Setting) -> Complexes:
     -------
     complex128, shape (N, 2n), per unit of tau, sorted by real part, the largest first.
     """
-    lam, n = setting.lam, setting.n
-    m = np.arange(n)
-    system = np.zeros((len(setting), 2 * n, 2 * n))
-    system[:, m, n + m] = 1.0
-    system[:, n + m, n + m] = -chain.delta
-    system[:, n + m, m] = -1.0 - lam
-    system[:, n + m, (m - 1) % n] += lam
-    if chain.closure is Closure.OPEN:
+    scaled = replace(ScaledChain.of(chain, setting), omega=np.ones(len(setting)))
+    if scaled.law.feed_forward:
         # Triangular: the roots of each oscillator alone, without the rounding of a defective matrix.
-        root = np.sqrt(0.25 * chain.delta**2 - 1.0 - lam + 0j)
-        found = np.concatenate([-0.5 * chain.delta + root, -0.5 * chain.delta - root], axis=1)
+        root = np.sqrt(0.25 * scaled.delta**2 - scaled.k + 0j)
+        found = np.concatenate([-0.5 * scaled.delta + root, -0.5 * scaled.delta - root]).T
     else:
-        found = np.linalg.eigvals(system).astype(np.complex128)
+        found = np.linalg.eigvals(rest_matrix(scaled)).astype(np.complex128)
     order = np.argsort(-found.real, axis=1, kind="stable")
     return np.take_along_axis(found, order, axis=1)
 

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis
-from ..equations.scaling import Stages
-from ..floquet.floquet import chain_multipliers
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
+from ..floquet.hill import chain_multipliers
 from ..floquet.monodromy import joint_multipliers
 from ..harmonic_balance.balance import linearise
 from ..harmonic_balance.joint import follow_load, newton_joint
 from ..harmonic_balance.march import march, oscillator
-from ..model.chain import Chain, Setting
 
 __all__ = ["BalanceSystem", "Parameter"]
 
@@ -60,22 +60,22 @@ class BalanceSystem:
         some = Setting.of(self.chain, epsilon=0.0, lam=1.0, omega=1.0)
         return np.array(some.lam)
 
-    def at(self, value: float) -> Stages:
-        """The stages with the parameter at `value`."""
+    def at(self, value: float) -> ScaledChain:
+        """The scaled chain with the parameter at `value`."""
         if self.parameter is Parameter.LAM:
-            return Stages.of(self.chain, replace(self.setting, lam=value * self._ratios))
-        return Stages.of(self.chain, replace(self.setting, **{str(self.parameter): np.array([value])}))
+            return ScaledChain.of(self.chain, replace(self.setting, lam=value * self._ratios))
+        return ScaledChain.of(self.chain, replace(self.setting, **{str(self.parameter): np.array([value])}))
 
     def start(self, phasor: Complexes | None) -> Floats | None:
         """u at `setting`: on the lower branch, or beside `phasor` (n,); None where Newton finds none."""
-        stages = self.at(self.value)
+        scaled = self.at(self.value)
         n, d = self.chain.n, self.basis.size
         if phasor is None:
-            found = follow_load(stages, self.basis) if stages.joint else march(stages, self.basis)
+            found = follow_load(scaled, self.basis) if scaled.joint else march(scaled, self.basis)
         else:
             guide = np.zeros((n, d, 1))
-            guide[:, 0, 0], guide[:, 1, 0] = phasor.real * stages.length, phasor.imag * stages.length
-            found = newton_joint(stages, self.basis, guide) if stages.joint else march(stages, self.basis, guide)
+            guide[:, 0, 0], guide[:, 1, 0] = phasor.real * scaled.length, phasor.imag * scaled.length
+            found = newton_joint(scaled, self.basis, guide) if scaled.joint else march(scaled, self.basis, guide)
         return np.append(found.x[:, :, 0].ravel(), self.value) if found.ok[0] else None
 
     def scaled(self, span: float) -> BalanceSystem:
@@ -102,7 +102,7 @@ class BalanceSystem:
     def stable(self, u: Floats) -> NDArray[np.bool_]:
         """Stability of points u (K, n d + 1); bool, shape (K,)."""
         whole = [self.at(float(value)) for value in u[:, -1]]
-        stages = replace(
+        scaled = replace(
             whole[0],
             omega=np.concatenate([each.omega for each in whole]), k=np.concatenate([each.k for each in whole], axis=1),
             lam=np.concatenate([each.lam for each in whole], axis=1),
@@ -111,32 +111,32 @@ class BalanceSystem:
             other=None if whole[0].other is None else np.concatenate([_other(each) for each in whole], axis=1),
         )  # fmt: skip
         x = u[:, :-1].reshape(len(u), self.chain.n, self.basis.size).transpose(1, 2, 0)
-        turn = joint_multipliers if stages.joint else chain_multipliers
-        multipliers = turn(stages, self.basis, np.ascontiguousarray(x))
+        turn = joint_multipliers if scaled.joint else chain_multipliers
+        multipliers = turn(scaled, self.basis, np.ascontiguousarray(x))
         return np.asarray((np.abs(multipliers) < 1).all(axis=(1, 2)), dtype=np.bool_)
 
     def _balance(self, x: Floats, value: float) -> tuple[Floats, Floats]:
-        stages = self.at(value)
+        scaled = self.at(value)
         n, d = self.chain.n, self.basis.size
         rows = x.reshape(n, d, 1)
         residual, matrix = np.empty((n, d)), np.zeros((n * d, n * d))
         for m in range(n):
-            osc = oscillator(stages, m)
+            osc = oscillator(scaled, m)
             jacobian, twice = linearise(self.basis, osc.coefficients(self.basis), osc.sign, rows[m])
             residual[m] = (jacobian[:, :, 0] @ rows[m] - twice)[:, 0]
             if self.basis.mean:
-                residual[m, -1] -= stages.force[m, 0]
+                residual[m, -1] -= scaled.force[m, 0]
             here = slice(m * d, (m + 1) * d)
             matrix[here, here] = jacobian[:, :, 0]
-        residual[0, 0] -= stages.drive[0].real
-        residual[0, 1] -= stages.drive[0].imag
-        for fed, feeds, strength in stages.links():
+        residual[0, 0] -= scaled.drive[0].real
+        residual[0, 1] -= scaled.drive[0].imag
+        for fed, feeds, strength in scaled.links():
             for to, by, link in zip(fed, feeds, strength[:, 0], strict=True):
                 residual[to] -= link * rows[by, :, 0]
                 matrix[to * d : (to + 1) * d, by * d : (by + 1) * d] -= link * np.eye(d)
         return residual.ravel(), matrix
 
 
-def _other(stages: Stages) -> Floats:
-    assert stages.other is not None
-    return stages.other
+def _other(scaled: ScaledChain) -> Floats:
+    assert scaled.other is not None
+    return scaled.other

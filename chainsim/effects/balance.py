@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for, resize
-from ..equations.scaling import Stages
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Stats
 from .effects import Terms
 from .lines import Lines
@@ -57,15 +57,15 @@ def balance_with_terms(chain: Chain, setting: Setting, terms: Terms, *, tol: flo
         Whether the answer is stable is not looked at.
     """
     began = time.perf_counter()
-    stages = Stages.of(chain, setting)
-    mean = stages.has_mean
+    scaled = ScaledChain.of(chain, setting)
+    mean = scaled.has_mean
     old, x, error, work = basis_for(ORDERS[0], mean), None, math.inf, 0
     for order in ORDERS:
-        system = _System.of(chain, setting, terms, stages, basis_for(order, mean))
+        system = _System.of(chain, setting, terms, scaled, basis_for(order, mean))
         if x is not None:
             begin = _resized(x, old, system.basis)
         elif guide is not None:
-            begin = system.basis.coordinates(guide.amplitude, guide.mean).T * stages.length
+            begin = system.basis.coordinates(guide.amplitude, guide.mean).T * scaled.length
         else:
             begin = None
         found, steps = system.solve(begin)
@@ -82,7 +82,7 @@ def balance_with_terms(chain: Chain, setting: Setting, terms: Terms, *, tol: flo
     outcome = Outcome.OK if error <= tol else Outcome.OUT_OF_BUDGET
     stats = Stats(newton_steps=work, oscillators_solved=chain.n, seconds=time.perf_counter() - began)
     assert x is not None
-    tip = system.tips(x).T / stages.length
+    tip = system.tips(x).T / scaled.length
     amplitude, still = old.phasors(tip), tip[-1] if mean else np.zeros(chain.n)
     return Steady(
         outcome,
@@ -133,29 +133,29 @@ class _System:
     touch: Floats
 
     @classmethod
-    def of(cls, chain: Chain, setting: Setting, terms: Terms, stages: Stages, basis: Basis) -> _System:
+    def of(cls, chain: Chain, setting: Setting, terms: Terms, scaled: ScaledChain, basis: Basis) -> _System:
         n, omega = chain.n, float(setting.omega[0])
-        deltas, own = stages.of_each(stages.delta), np.broadcast_to(chain.stiffness, (n,))
+        deltas, own = scaled.of_each(scaled.delta), np.broadcast_to(chain.stiffness, (n,))
         creep, modes = terms.creep, terms.modes or ()
         times = () if creep is None else creep.times
         share = 0.0 if creep is None else creep.per_decade / creep.each
         bandwidth = math.inf if terms.amplifier is None else terms.amplifier.bandwidth
-        links = np.diag(own - stages.k[:, 0])
-        for fed, source, link in stages.links():
+        links = np.diag(own - scaled.k[:, 0])
+        for fed, source, link in scaled.links():
             np.add.at(links, (fed, source), link[:, 0])
         force, touch = np.zeros((2, n, basis.size))
         if basis.order:
-            drive = stages.drive[0] / (1 + 1j * omega / bandwidth)
+            drive = scaled.drive[0] / (1 + 1j * omega / bandwidth)
             force[0, 0], force[0, 1] = drive.real, drive.imag
         if basis.mean:
-            force[:, -1] = setting.bias[0] * stages.length
-            touch[0, -1] = setting.preload[0] * stages.length
+            force[:, -1] = setting.bias[0] * scaled.length
+            touch[0, -1] = setting.preload[0] * scaled.length
         return cls(
             basis,
             np.stack([_factor(basis, _oscillator(k, delta), omega) for k, delta in zip(own, deltas, strict=True)]),
             _factor(basis, lambda s: 1 / (1 + sum(share / (1 + s * time) for time in times)), omega),
             _factor(basis, lambda s: sum(j.gain / (j.omega**2 + s * s + j.delta * s) for j in modes) + 0j, omega),
-            stages.of_each(stages.sign), links, force, touch,
+            scaled.of_each(scaled.sign), links, force, touch,
         )  # fmt: skip
 
     def solve(self, begin: Floats | None) -> tuple[Floats | None, int]:

@@ -1,4 +1,4 @@
-"""What else a real actuator does, each off (None) unless asked for: only the integrator in `terms_ode` has them.
+"""What else a real actuator does, each off (None) unless asked for; only the integrator in `effects.ode` has it all.
 
 The electric force e_m (drive, link and bias of an actuator) becomes force through hysteresis, then creep:
 

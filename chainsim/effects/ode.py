@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations.scaling import second_links
-from ..model.chain import Chain, CouplingKind, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Stats
 from .effects import BoucWen, Play, Terms, TermsError, Tone
 from .kernel import Plant, advance
@@ -127,7 +126,8 @@ def _plant(chain: Chain, setting: Setting, terms: Terms, ramp: float) -> Plant:
     if len(setting) != 1 or setting.n != chain.n:
         raise TermsError(f"setting: expected one setting of the chain, got {len(setting)} of {setting.n}")
     each, none = np.ones(chain.n), np.empty(0)
-    links, stride = second_links(chain, setting)
+    law, lam = chain.law, setting.lam[0]
+    other = law.second(lam, None if setting.lam_y is None else setting.lam_y[0])
     one = Tone(float(setting.epsilon[0]), float(setting.omega[0]), float(setting.phase[0]))
     tones = np.array([[t.epsilon, t.omega, t.phase] for t in terms.tones or (one,)])
     amplifier, hysteresis, creep = terms.amplifier, terms.hysteresis, terms.creep
@@ -138,12 +138,13 @@ def _plant(chain: Chain, setting: Setting, terms: Terms, ramp: float) -> Plant:
         radius, weight, base = np.array(hysteresis.radius), np.array(hysteresis.weight), hysteresis.base
     modes = np.array([[mode.omega**2, mode.delta, mode.gain] for mode in terms.modes or ()]).reshape(-1, 3)
     return Plant(
-        chain.deltas * each, chain.betas * each, chain.stiffness * each, np.array(setting.lam[0]),
-        0.0 * each if links is None else np.array(links[0]), stride,
-        float(chain.kind is CouplingKind.RESISTOR), np.array(setting.bias[0]), float(setting.preload[0]), tones, ramp,
+        chain.deltas * each, chain.betas * each, chain.stiffness * each,
+        np.array(lam), 0.0 * each if other is None else np.array(other), law.stride, law.back,
+        np.array(setting.bias[0]), float(setting.preload[0]), tones, ramp,
         none if amplifier is None else np.array([amplifier.bandwidth, amplifier.slew, amplifier.limit]),
-        bouc, radius, weight, base, none if creep is None else 1 / np.array(creep.times),
-        0.0 if creep is None else creep.per_decade / creep.each, modes,
+        bouc, radius, weight, base,
+        none if creep is None else 1 / np.array(creep.times), 0.0 if creep is None else creep.per_decade / creep.each,
+        modes,
     )  # fmt: skip
 
 

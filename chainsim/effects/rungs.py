@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Stats
 from ..rung import RungError, Start
 from .balance import balance_refusal, balance_with_terms
@@ -71,8 +71,8 @@ def _refusal(chain: Chain, setting: Setting, terms: Terms) -> str:
         return f"{', '.join(others)} with several tones"
     if count != 2:
         return f"{count} tones"
-    if not chain.feed_forward or chain.rows > 1:
-        return f"two tones of a {'grid' if chain.rows > 1 else f'{chain.closure} chain'}"
+    if not chain.law.in_line:
+        return f"two tones of a {chain.law.name}"
     return "two tones with bias or preload" if setting.bias.any() or setting.preload.any() else ""
 
 

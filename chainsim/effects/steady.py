@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..averaging.settle import strongest_line
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Stats
 from ..rung import RungError, Start
 from .effects import Terms, Tone

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations.scaling import Stages
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome
 from .effects import TermsError, Tone
 
@@ -78,7 +78,7 @@ def two_tones(chain: Chain, setting: Setting, tones: tuple[Tone, Tone], *, order
     TermsError
         For a ring, a grid, a bias, equal frequencies, or an even order.
     """
-    if not chain.feed_forward or chain.rows > 1:
+    if not chain.law.in_line:
         raise TermsError("two tones: open chains only; use integrate_terms for the others")
     if len(setting) != 1 or setting.bias.any() or setting.preload.any():
         raise TermsError("two tones: expected one setting without bias or preload; use integrate_terms")
@@ -140,9 +140,9 @@ def _solved(chain: Chain, setting: Setting, tones: tuple[Tone, Tone], order: int
     """Amplitudes (H, n), or why there are none."""
     torus = _Torus(order, (tones[0].omega, tones[1].omega))
     strongest = max(abs(t.epsilon) for t in tones)
-    stages = Stages.of(chain, Setting.of(chain, epsilon=strongest, lam=0.0, omega=1.0))
-    length, sign = stages.length, np.broadcast_to(stages.sign, (chain.n, 1))[:, 0]
-    stiffness = Stages.of(chain, setting).k[:, 0]
+    scaled = ScaledChain.of(chain, Setting.of(chain, epsilon=strongest, lam=0.0, omega=1.0))
+    length, sign = scaled.length, np.broadcast_to(scaled.sign, (chain.n, 1))[:, 0]
+    stiffness = ScaledChain.of(chain, setting).k[:, 0]
     delta = np.broadcast_to(chain.deltas, (chain.n,))
     force = np.zeros(2 * len(torus.index))
     for tone, k in zip(tones, ((1, 0), (0, 1)), strict=True):

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..effects.effects import Terms
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
 from ..model.response import Outcome, Response, Stats
-from ..reach.ladder import solve
+from ..reach.ladder import every_branch, lists_jointly, solve
 from ..rung import RungError, Start
 
 if TYPE_CHECKING:
@@ -88,15 +88,12 @@ def plain_with_terms(
 
 def _every_branch(chain: Chain, setting: Setting, *, tol: float, rung: str) -> dict[str, Any]:
     """The lowest stable answer with `answers`, all of them, and `complete`, whether there are surely no others."""
-    if chain.feed_forward or not chain.betas.any() or rung in ("linear", "envelope", "ode"):
+    if lists_jointly(chain, rung):
+        found = every_branch(chain, setting, tol=tol, rung=rung)
+        response, complete = found.response, found.complete
+    else:
         response = solve(chain, setting, tol=tol, rung=rung, start=Start.ALL)
         complete = _is_complete(chain, setting, response)
-    else:
-        from ..harmonic_balance.joint_branches import joint_branches
-
-        name = rung if rung != "auto" else "harmonic_balance" if setting.epsilon.any() else "static"
-        found = joint_branches(chain, setting, tol=tol, rung=name)
-        response, complete = found.response, found.complete
     answers = [_plain(response, index) for index in range(len(response))]
     first = next((answer for answer in answers if answer["outcome"] == Outcome.OK), answers[0])
     return {**first, "answers": answers, "complete": complete}

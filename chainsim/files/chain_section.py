@@ -6,7 +6,8 @@ from typing import Annotated, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..model.chain import Chain, Closure, CouplingKind
+from ..equations.chain import Chain
+from ..equations.coupling import Closure, CouplingKind
 
 __all__ = ["ChainSection", "GridSection"]
 

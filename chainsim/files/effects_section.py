@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone
-from ..model.chain import Setting
+from ..equations.chain import Setting
 
 __all__ = ["TermsSection"]
 

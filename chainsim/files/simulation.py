@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from ..model.chain import Chain, Closure, Setting
-from ..rung import Start
+from ..equations.chain import Chain, Setting
+from ..rung import RUNGS, Start
 from ..yamlfile import parse_model, read_model
 from .answer import plain_of, plain_with_terms
 from .chain_section import ChainSection
@@ -22,6 +22,11 @@ __all__ = ["Simulation", "parse_simulation", "read_simulation", "simulate"]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 MAX_OSCILLATORS = 4096
+
+if TYPE_CHECKING:
+    RungName = str
+else:
+    RungName = Literal["auto", *RUNGS]
 
 
 class _Part(BaseModel):
@@ -54,7 +59,7 @@ class _Setting(_Part):
     def _of_chain(self, chain: Chain) -> dict[str, Any]:
         if self.lam_x is not None or self.lam_y is not None:
             raise ValueError("setting.lam_x, lam_y: these are the links of a grid; give lam for a chain")
-        wanted = chain.n if chain.closure is Closure.RING else chain.n - 1
+        wanted = chain.law.count(chain.n)
         if isinstance(self.lam, list) and len(self.lam) != wanted:
             raise ValueError(f"setting.lam: expected a number or a list of {wanted}, got a list of {len(self.lam)}")
         return {"lam": self.lam if isinstance(self.lam, float) else np.array(self.lam, dtype=float).reshape(wanted)}
@@ -90,7 +95,7 @@ class Simulation(_Part):
     chain: _Chain
     setting: _Setting
     terms: TermsSection | None = None
-    rung: Literal["auto", "static", "linear", "one_harmonic", "harmonic_balance", "envelope", "ode"] = "auto"
+    rung: RungName = "auto"
     tol: Annotated[float, Field(ge=1e-12, le=1)]
     start: Start = Start.REST
 

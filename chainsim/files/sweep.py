@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
+from ..equations.chain import Chain, Setting
 from ..errors import ProfileError
-from ..model.chain import Chain, Setting
 from ..yamlfile import read_model
 from .chain_section import ChainSection
 from .sweep_table import AXES, read_table

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for
-from ..equations.scaling import Stages
-from ..floquet.floquet import chain_multipliers
+from ..equations.scaled_chain import ScaledChain
+from ..floquet.hill import chain_multipliers
 from ..floquet.monodromy import joint_multipliers
 from ..model.response import Outcome, Response, Stats
 from .joint import correct_joint, rounding_of
@@ -65,25 +65,25 @@ def finer(basis: Basis) -> Basis:
     return basis_for(ORDERS[ORDERS.index(basis.order) + 1], basis.mean)
 
 
-def defect(stages: Stages, basis: Basis, x: Floats) -> Floats:
+def defect(scaled: ScaledChain, basis: Basis, x: Floats) -> Floats:
     """Error of the first harmonic, the mean and every harmonic in `basis`, bought with one Newton step in a finer one.
 
     x has shape (n, d, N); the result is float64, shape (N,), relative to the setting's largest amplitude, and inf
     where the step is not finite.
     """
-    if stages.linear and basis.order and not stages.joint:
-        return _floor(stages, basis, x)
+    if scaled.linear and basis.order and not scaled.joint:
+        return _floor(scaled, basis, x)
     sharper = finer(basis)
-    step = correct_joint if stages.joint else correct_long if is_long(stages) else correct
-    moved = step(stages, sharper, x, basis)
+    step = correct_joint if scaled.joint else correct_long if is_long(scaled) else correct
+    moved = step(scaled, sharper, x, basis)
     mine, other = _shared(basis, sharper)
     size = np.abs(moved).max(axis=(0, 1))
     away = np.abs(moved[:, other] - x[:, mine]).max(axis=(0, 1))
     if not basis.order:
         # Without a drive what is found there is rounding, grown from stage to stage.
-        away = np.where(stages.drive == 0, away, np.maximum(away, np.abs(moved[:, :2]).max(axis=(0, 1))))
+        away = np.where(scaled.drive == 0, away, np.maximum(away, np.abs(moved[:, :2]).max(axis=(0, 1))))
     relative = np.where(away == 0, 0.0, SAFETY * away / size)
-    relative = relative + (rounding_of(stages, basis, x) if stages.joint else _floor(stages, basis, x))
+    relative = relative + (rounding_of(scaled, basis, x) if scaled.joint else _floor(scaled, basis, x))
     return np.where(np.isfinite(relative), relative, np.inf)
 
 
@@ -94,43 +94,42 @@ def _shared(basis: Basis, sharper: Basis) -> tuple[list[int], list[int]]:
     return ([*mine, basis.size - 1], [*other, sharper.size - 1]) if basis.mean else (mine, other)
 
 
-def _floor(stages: Stages, basis: Basis, x: Floats) -> Floats:
+def _floor(scaled: ScaledChain, basis: Basis, x: Floats) -> Floats:
     """What rounding does to the answer x of a feed-forward chain, relative to its largest amplitude; shape (N,)."""
-    stiff = np.abs(stages.k).max(axis=0) + (stages.omega**2 if basis.order else 0.0)
-    resonant: Floats = ROUNDING * (1 + stiff / np.maximum(stages.delta.min() * stages.omega, 1e-12))
+    stiff = np.abs(scaled.k).max(axis=0) + (scaled.omega**2 if basis.order else 0.0)
+    resonant: Floats = ROUNDING * (1 + stiff / np.maximum(scaled.delta.min() * scaled.omega, 1e-12))
     if (resonant <= FINE).all():
         return resonant
-    size, sharp = np.abs(x).max(axis=1), _sharpness(stages, basis, x)
-    away = np.zeros(stages.k.shape)
-    own = (np.abs(stages.k) + (stages.omega**2 if basis.order else 0.0) + 3 * np.abs(stages.sign) * size**2) * size
-    for layer in stages.layers:
+    size, sharp = np.abs(x).max(axis=1), _sharpness(scaled, basis, x)
+    away = np.zeros(scaled.k.shape)
+    own = (np.abs(scaled.k) + (scaled.omega**2 if basis.order else 0.0) + 3 * np.abs(scaled.sign) * size**2) * size
+    for layer in scaled.layers:
         total = own[layer]
-        for links, source in ((stages.lam, layer - 1), (stages.other, layer + stages.stride)):
-            if links is not None:
-                total += np.abs(links[layer]) * np.where((source >= 0)[:, None], away[np.maximum(source, 0)], 0.0)
+        for links, source in scaled.feeds(layer):
+            total += np.abs(links) * np.where((source >= 0)[:, None], away[np.maximum(source, 0)], 0.0)
         away[layer] = np.where(total > 0, total / sharp[layer], 0.0)
     largest = size.max(axis=0)
     relative = ROUNDING * (1 + np.where(largest > 0, away.max(axis=0) / largest, 0.0))
     return np.where(resonant <= FINE, resonant, relative)
 
 
-def _sharpness(stages: Stages, basis: Basis, x: Floats) -> Floats:
+def _sharpness(scaled: ScaledChain, basis: Basis, x: Floats) -> Floats:
     """Least force that moves an oscillator by 1 from its answer x, by its harmonics one by one; float64, shape (n, N).
 
     A small change a of a harmonic of impedance p costs ``p a + q a*``, so at least ``||p| - |q||``.
     """
     still = x[:, -1] ** 2 if basis.mean else 0.0
     square = (x[:, : 2 * len(basis.harmonics)] ** 2).sum(axis=1)
-    own = stages.k + stages.sign * (3 * still + 1.5 * square)
+    own = scaled.k + scaled.sign * (3 * still + 1.5 * square)
     sharp = np.abs(own) if basis.mean else np.full(own.shape, np.inf)
-    first = np.abs(stages.sign) * (0.75 * (x[:, 0] ** 2 + x[:, 1] ** 2) if basis.order else 0.0)
+    first = np.abs(scaled.sign) * (0.75 * (x[:, 0] ** 2 + x[:, 1] ** 2) if basis.order else 0.0)
     for harmonic in basis.harmonics:
-        impedance = np.hypot(own - (harmonic * stages.omega) ** 2, harmonic * stages.delta * stages.omega)
+        impedance = np.hypot(own - (harmonic * scaled.omega) ** 2, harmonic * scaled.delta * scaled.omega)
         sharp = np.minimum(sharp, np.abs(impedance - (first if harmonic == 1 else 0.0)))
     return sharp
 
 
-def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: float) -> Response:
+def response_of(scaled: ScaledChain, rung: str, answer: Answer, work: Stats, began: float) -> Response:
     """The `Response` in the chain's own units: unsolved settings become NaN, unstable ones say so.
 
     `began` is the reading of `time.perf_counter` when the work started.
@@ -139,18 +138,18 @@ def response_of(stages: Stages, rung: str, answer: Answer, work: Stats, began: f
     multipliers = answer.multipliers
     if multipliers is None:
         known_only = np.where(solved, answer.x, np.nan)
-        multipliers = (joint_multipliers if stages.joint else chain_multipliers)(stages, answer.basis, known_only)
+        multipliers = (joint_multipliers if scaled.joint else chain_multipliers)(scaled, answer.basis, known_only)
     stable = solved & (np.abs(multipliers) < 1 - ROUNDED).all(axis=(1, 2))
     known = np.isfinite(multipliers).all(axis=(1, 2))
     outcome = answer.outcome.copy()
     outcome[solved & ~stable] = Outcome.UNSTABLE
     outcome[solved & ~(known & np.isfinite(answer.estimate))] = Outcome.OUT_OF_BUDGET
-    x = np.where(solved, answer.x, np.nan) / stages.length
+    x = np.where(solved, answer.x, np.nan) / scaled.length
     harmonics = answer.basis.phasors(x.transpose(1, 2, 0)).transpose(1, 0, 2)
     if not solved.all():
         harmonics[~solved] = complex(np.nan, np.nan)
-    mean = x[:, -1].T.copy() if answer.basis.mean else np.where(solved[:, None], 0.0, np.full((len(stages), 1), np.nan))
-    mean = np.array(np.broadcast_to(mean, (len(stages), stages.n)))
+    mean = x[:, -1].T.copy() if answer.basis.mean else np.where(solved[:, None], 0.0, np.full((len(scaled), 1), np.nan))
+    mean = np.array(np.broadcast_to(mean, (len(scaled), scaled.n)))
     estimate = np.where(solved, answer.estimate, np.inf)
     branch = np.ascontiguousarray(answer.branch.T)
     for array in (harmonics, mean, multipliers, branch, estimate, stable, outcome):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 from ..rung import RungError
 from .balance import Oscillator, newton
 from .march import March, cubic_of, first_phasor, oscillator, push
@@ -21,8 +21,8 @@ MAX_BRANCHES = 2048
 SAME = 1e-6
 
 
-def all_branches(stages: Stages, basis: Basis) -> March:
-    """Every answer of the one setting in `stages`, along the batch axis; the lowest at every oscillator first.
+def all_branches(scaled: ScaledChain, basis: Basis) -> March:
+    """Every answer of the one setting of `scaled`, along the batch axis; the lowest at every oscillator first.
 
     Raises
     ------
@@ -31,11 +31,10 @@ def all_branches(stages: Stages, basis: Basis) -> March:
     """
     x, branch = np.empty((0, basis.size, 1)), np.empty((0, 1), dtype=np.int8)
     steps = 0
-    for m in range(stages.n):
-        paths = stages.pick(np.zeros(x.shape[2], dtype=np.intp))
-        above = x[m + stages.stride] if m >= -stages.stride > 0 else None
-        force = push(paths, basis, m, x[m - 1] if m else None, above)
-        found, path, work = _answers(oscillator(stages, m), basis, force)
+    for m in range(scaled.n):
+        paths = scaled.pick(np.zeros(x.shape[2], dtype=np.intp))
+        force = push(paths, basis, m, x)
+        found, path, work = _answers(oscillator(scaled, m), basis, force)
         steps += work
         if len(path) > MAX_BRANCHES:
             raise RungError(f"more than {MAX_BRANCHES} branches by oscillator {m}; use start rest, or a shorter chain")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for, resize
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 from .march import March
 
 __all__ = ["blank", "filled", "let_down", "undriven"]
@@ -30,30 +30,30 @@ MOST_FALLS = 60
 MOST = 64
 
 
-def undriven(stages: Stages, basis: Basis, solve: Callable[[Stages, Basis], March]) -> March:
+def undriven(scaled: ScaledChain, basis: Basis, solve: Callable[[ScaledChain, Basis], March]) -> March:
     """Settings without a drive: the equilibrium in the well under constant forces, as a series in `basis`."""
     still = basis_for(0, True)
-    found = solve(stages, still)
-    held = (stages.k + 3 * stages.sign * found.x[:, 0] ** 2 > 0).all(axis=0)
+    found = solve(scaled, still)
+    held = (scaled.k + 3 * scaled.sign * found.x[:, 0] ** 2 > 0).all(axis=0)
     x = np.stack([resize(each, still, basis) for each in found.x])
     return March(basis, x, found.ok & held, found.branch, found.steps)
 
 
-def let_down(stages: Stages, basis: Basis, solve: Callable[[Stages, Basis, Floats], March]) -> March:
+def let_down(scaled: ScaledChain, basis: Basis, solve: Callable[[ScaledChain, Basis, Floats], March]) -> March:
     """An answer of every setting, not `ok` where none was found; `solve` is Newton's method from a guess (n, d, N)."""
-    whole = blank(stages, basis)
-    for fall in FALLS if stages.n <= MOST else ():
+    whole = blank(scaled, basis)
+    for fall in FALLS if scaled.n <= MOST else ():
         lost = np.flatnonzero(~whole.ok)
         if not len(lost):
             break
-        left, found = _at_rate(stages.pick(lost), basis, solve, fall)
+        left, found = _at_rate(scaled.pick(lost), basis, solve, fall)
         whole = filled(whole, lost[left], found)
     return whole
 
 
-def blank(stages: Stages, basis: Basis) -> March:
+def blank(scaled: ScaledChain, basis: Basis) -> March:
     """No answer for any setting."""
-    n, size = stages.n, len(stages)
+    n, size = scaled.n, len(scaled)
     x, branch = np.zeros((n, basis.size, size)), np.zeros((n, size), dtype=np.int8)
     return March(basis, x, np.zeros(size, dtype=bool), branch, 0)
 
@@ -66,22 +66,22 @@ def filled(whole: March, index: Wholes, part: March) -> March:
 
 
 def _at_rate(
-    stages: Stages, basis: Basis, solve: Callable[[Stages, Basis, Floats], March], fall: float
+    scaled: ScaledChain, basis: Basis, solve: Callable[[ScaledChain, Basis, Floats], March], fall: float
 ) -> tuple[Wholes, March]:
     """The settings that could be followed all the way, and their answers."""
-    own = max(float(stages.delta.min()), 1e-6)
+    own = max(float(scaled.delta.min()), 1e-6)
     # Every setting goes down the same stairs from where it needs to, so that none depends on another.
-    stair = np.ceil(np.log(_enough(stages) / (LAST * own)) / -np.log(fall))
+    stair = np.ceil(np.log(_enough(scaled) / (LAST * own)) / -np.log(fall))
     left = np.flatnonzero(stair <= MOST_FALLS)
     top = int(stair[left].max(initial=0))
-    guess, steps = np.zeros((stages.n, basis.size, len(stages))), 0
-    ok, branch = np.zeros(len(stages), dtype=bool), np.zeros((stages.n, len(stages)), dtype=np.int8)
+    guess, steps = np.zeros((scaled.n, basis.size, len(scaled))), 0
+    ok, branch = np.zeros(len(scaled), dtype=bool), np.zeros((scaled.n, len(scaled)), dtype=np.int8)
     ok[left] = True
     for level in range(top, -1, -1):
         now = np.flatnonzero(ok & (stair >= level))
         if not len(now):
             continue
-        here, extra = stages.pick(now), LAST * own * fall ** -float(level) if level else 0.0
+        here, extra = scaled.pick(now), LAST * own * fall ** -float(level) if level else 0.0
         found = solve(replace(here, delta=here.delta + extra), basis, guess[:, :, now])
         guess[:, :, now], ok[now], branch[:, now] = found.x, found.ok, found.branch
         steps += found.steps
@@ -89,11 +89,11 @@ def _at_rate(
     return left, March(basis, guess[:, :, left], ok[left], branch[:, left], steps)
 
 
-def _enough(stages: Stages) -> Floats:
+def _enough(scaled: ScaledChain) -> Floats:
     """Damping beside which the cubic term, every stiffness and every link are small; float64, shape (N,)."""
-    links = np.abs(stages.lam).max(axis=0)
-    if stages.other is not None:
-        links = links + np.abs(stages.other).max(axis=0)
-    stiff = np.abs(stages.k).max(axis=0) + stages.omega**2 + links
-    enough: Floats = 3 * (np.cbrt(np.abs(stages.drive)) ** 2 + stiff) / stages.omega
+    links = np.abs(scaled.lam).max(axis=0)
+    if scaled.other is not None:
+        links = links + np.abs(scaled.other).max(axis=0)
+    stiff = np.abs(scaled.k).max(axis=0) + scaled.omega**2 + links
+    enough: Floats = 3 * (np.cbrt(np.abs(scaled.drive)) ** 2 + stiff) / scaled.omega
     return enough

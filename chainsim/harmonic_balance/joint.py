@@ -1,8 +1,8 @@
 """All oscillators at once, where they act on each other (ring, bidirectional): Newton on the coupled balance equations.
 
 Row m of the Jacobian has the block J_m of the oscillator alone, and minus the link times the identity at each of its
-two neighbours. Numbered 0, n-1, 1, n-2, ... neighbours are at most two apart also round a ring, so elimination with
-row exchanges stays in a band: time and memory are O(n).
+two neighbours. In the order that the coupling law gives neighbours are at most two apart also round a ring, so
+elimination with row exchanges stays in a band: time and memory are O(n).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, resize
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 from .balance import linearise
 from .march import March, branches_of, layer_of
 
@@ -44,22 +44,22 @@ class _Solved:
     steps: int
 
 
-def newton_joint(stages: Stages, basis: Basis, guess: Floats) -> March:
+def newton_joint(scaled: ScaledChain, basis: Basis, guess: Floats) -> March:
     """Solve the whole chain in `basis` from `guess` (n, d, N)."""
-    solved = _newton(stages, basis, guess, np.ones(len(stages)))
-    return March(basis, solved.x, solved.ok, branches_of(stages, basis, solved.x), solved.steps)
+    solved = _newton(scaled, basis, guess, np.ones(len(scaled)))
+    return March(basis, solved.x, solved.ok, branches_of(scaled, basis, solved.x), solved.steps)
 
 
-def follow_load(stages: Stages, basis: Basis) -> March:
+def follow_load(scaled: ScaledChain, basis: Basis) -> March:
     """The answer that grows from rest as every force is raised from 0; not `ok` where it ends in a fold before 1."""
-    n, size = stages.n, len(stages)
+    n, size = scaled.n, len(scaled)
     rest = np.zeros((n, basis.size, size))
     x, before = rest.copy(), rest.copy()
     load, last, step = np.zeros(size), np.zeros(size), np.ones(size)
     ok, count = np.zeros(size, dtype=bool), 0
     active = np.arange(size)
     while len(active):
-        here = stages.pick(active)
+        here = scaled.pick(active)
         target = np.minimum(load[active] + step[active], 1.0)
         guess = _predict(here, basis, x[:, :, active], before[:, :, active], load[active], last[active], target)
         solved = _newton(here, basis, guess, target)
@@ -74,53 +74,53 @@ def follow_load(stages: Stages, basis: Basis) -> March:
         step[lost] = 0.5 * (target[~good] - load[lost])
         ok[won] = load[won] == 1.0
         active = active[~ok[active] & (step[active] >= SHORTEST)]
-    return March(basis, x, ok, branches_of(stages, basis, x), count)
+    return March(basis, x, ok, branches_of(scaled, basis, x), count)
 
 
 def _predict(
-    stages: Stages, basis: Basis, x: Floats, before: Floats, load: Floats, last: Floats, target: Floats
+    scaled: ScaledChain, basis: Basis, x: Floats, before: Floats, load: Floats, last: Floats, target: Floats
 ) -> Floats:
     """Where the answer will be at the load `target`: on the line through the last two, or the tangent at rest."""
     with np.errstate(all="ignore"):
         onward = x + (x - before) * ((target - load) / (load - last))
     fresh = load == 0
     if fresh.any():
-        onward[:, :, fresh] = correct_joint(stages, basis, np.zeros_like(x), basis, target)[:, :, fresh]
+        onward[:, :, fresh] = correct_joint(scaled, basis, np.zeros_like(x), basis, target)[:, :, fresh]
     return onward
 
 
-def correct_joint(stages: Stages, basis: Basis, x: Floats, old: Basis, load: Floats | float = 1.0) -> Floats:
+def correct_joint(scaled: ScaledChain, basis: Basis, x: Floats, old: Basis, load: Floats | float = 1.0) -> Floats:
     """One Newton step of all oscillators in `basis` from x (n, d, N) in `old`, the forces times `load`."""
-    jacobian, right = _equations(stages, basis, resize(x.transpose(1, 0, 2), old, basis).transpose(1, 0, 2), load)
-    return _solve(stages, jacobian, right)
+    jacobian, right = _equations(scaled, basis, resize(x.transpose(1, 0, 2), old, basis).transpose(1, 0, 2), load)
+    return _solve(scaled, jacobian, right)
 
 
-def band_step(stages: Stages, basis: Basis, x: Floats, old: Basis, before: Floats | None) -> Floats:
+def band_step(scaled: ScaledChain, basis: Basis, x: Floats, old: Basis, before: Floats | None) -> Floats:
     """The same for one setting, always by a band; `before` (d, 1) acts on the first oscillator as well."""
-    jacobian, right = _equations(stages, basis, resize(x.transpose(1, 0, 2), old, basis).transpose(1, 0, 2), 1.0)
+    jacobian, right = _equations(scaled, basis, resize(x.transpose(1, 0, 2), old, basis).transpose(1, 0, 2), 1.0)
     if before is not None:
         right[0] += before
-    return _in_band(stages, jacobian[..., 0], right[..., 0], 0)[:, :, None]
+    return _in_band(scaled, jacobian[..., 0], right[..., 0], 0)[:, :, None]
 
 
-def rounding_of(stages: Stages, basis: Basis, x: Floats) -> Floats:
+def rounding_of(scaled: ScaledChain, basis: Basis, x: Floats) -> Floats:
     """What rounding of the equations does to x, relative to its largest coordinate; float64, shape (N,)."""
-    jacobian, _ = _equations(stages, basis, x, 1.0)
-    signs = np.where(np.arange(stages.n * basis.size) * 0.6180339887 % 1 < 0.5, -1.0, 1.0).reshape(x.shape[:2])
+    jacobian, _ = _equations(scaled, basis, x, 1.0)
+    signs = np.where(np.arange(scaled.n * basis.size) * 0.6180339887 % 1 < 0.5, -1.0, 1.0).reshape(x.shape[:2])
     size = np.abs(x).max(axis=(0, 1))
-    moved = _solve(stages, jacobian, signs[:, :, None] * np.abs(jacobian).max(axis=(1, 2))[:, None])
+    moved = _solve(scaled, jacobian, signs[:, :, None] * np.abs(jacobian).max(axis=(1, 2))[:, None])
     relative: Floats = ROUNDING * (1 + np.abs(moved).max(axis=(0, 1)))
     return np.where(size == 0, ROUNDING, relative)
 
 
-def _newton(stages: Stages, basis: Basis, guess: Floats, load: Floats) -> _Solved:
+def _newton(scaled: ScaledChain, basis: Basis, guess: Floats, load: Floats) -> _Solved:
     size = guess.shape[2]
     x, ok, count = guess.copy(), np.zeros(size, dtype=bool), 0
     active = np.arange(size)
     for _ in range(MAX_STEPS):
         here = x[:, :, active]
-        moved = correct_joint(stages.pick(active), basis, here, basis, load[active])
-        count += len(active) * stages.n
+        moved = correct_joint(scaled.pick(active), basis, here, basis, load[active])
+        count += len(active) * scaled.n
         with np.errstate(all="ignore"):
             length, large = np.abs(moved - here).max(axis=(0, 1)), np.abs(moved).max(axis=(0, 1))
             settled = length <= SMALL_STEP * large
@@ -132,31 +132,31 @@ def _newton(stages: Stages, basis: Basis, guess: Floats, load: Floats) -> _Solve
     return _Solved(x, ok, count)
 
 
-def _equations(stages: Stages, basis: Basis, x: Floats, load: Floats | float) -> tuple[Floats, Floats]:
+def _equations(scaled: ScaledChain, basis: Basis, x: Floats, load: Floats | float) -> tuple[Floats, Floats]:
     """Blocks J_m (n, d, d, N) of the oscillators alone, and the right sides (n, d, N) of Newton's next x."""
     n, d, size = x.shape
-    osc = layer_of(stages, np.arange(n))
+    osc = layer_of(scaled, np.arange(n))
     blocks, twice = linearise(basis, osc.coefficients(basis), osc.sign, x.transpose(1, 0, 2).reshape(d, -1))
     jacobian = blocks.reshape(d, d, n, size).transpose(2, 0, 1, 3)
     right = np.array(twice.reshape(d, n, size).transpose(1, 0, 2))
     if basis.order:
-        right[0, 0] += load * stages.drive.real
-        right[0, 1] += load * stages.drive.imag
+        right[0, 0] += load * scaled.drive.real
+        right[0, 1] += load * scaled.drive.imag
     if basis.mean:
-        right[:, -1] += load * stages.force
+        right[:, -1] += load * scaled.force
     return jacobian, right
 
 
-def _solve(stages: Stages, jacobian: Floats, right: Floats) -> Floats:
+def _solve(scaled: ScaledChain, jacobian: Floats, right: Floats) -> Floats:
     """Solve the coupled linear equations; NaN where they are singular."""
     n, d, size = right.shape
     if n * d > DENSE:
-        return np.stack([_in_band(stages, jacobian[..., j], right[..., j], j) for j in range(size)], axis=2)
+        return np.stack([_in_band(scaled, jacobian[..., j], right[..., j], j) for j in range(size)], axis=2)
     matrix = np.zeros((size, n, d, n, d))
     each = np.arange(d)
     for m in range(n):
         matrix[:, m, :, m, :] = jacobian[m].transpose(2, 0, 1)
-    for fed, source, link in stages.links():
+    for fed, source, link in scaled.links():
         for at in each:
             matrix[:, fed, at, source, at] -= link.T
     stacked = right.transpose(2, 0, 1).reshape(size, n * d)
@@ -178,27 +178,18 @@ def _each_or_nan(matrix: Floats, right: Floats) -> Floats:
     return found
 
 
-def _places(stages: Stages) -> Wholes:
-    """The place of each oscillator in the order 0, n-1, 1, n-2, ... of a ring; their own of a chain."""
-    n = stages.n
-    if not stages.ring:
-        return np.arange(n)
-    each = np.arange(n)
-    return np.where(2 * each < n, 2 * each, 2 * (n - each) - 1)
-
-
-def _in_band(stages: Stages, jacobian: Floats, right: Floats, setting: int) -> Floats:
+def _in_band(scaled: ScaledChain, jacobian: Floats, right: Floats, setting: int) -> Floats:
     """One setting: blocks (n, d, d) and right side (n, d), by banded elimination with row exchanges."""
     from scipy.linalg import LinAlgError, solve_banded
 
     n, d = right.shape
-    place = _places(stages)
-    reach = 2 * d if stages.ring else d
+    place, links = scaled.law.places(n), scaled.links()
+    reach = d * max([1, *(int(np.abs(place[fed] - place[source]).max(initial=0)) for fed, source, _ in links)])
     band = np.zeros((2 * reach + 1, n * d))
     row, column = np.arange(d)[:, None], np.arange(d)
     start = (place * d)[:, None, None]
     band[np.broadcast_to(reach + row - column, (n, d, d)), np.broadcast_to(start + column, (n, d, d))] = jacobian
-    for fed, source, link in stages.links():
+    for fed, source, link in links:
         apart = reach + (place[fed] - place[source]) * d
         np.subtract.at(band, (apart[:, None], place[source][:, None] * d + column), link[:, setting, None])
     ordered = np.empty((n, d))

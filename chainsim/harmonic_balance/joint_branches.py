@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for, resize
-from ..equations.scaling import Stages
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
-from ..rung import RungError
+from ..rung import RUNGS, RungError, load_rung
 from .answer import ORDERS, Answer, defect, finer, outcomes, response_of
 from .joint import follow_load, newton_joint
 from .joint_roots import Amplitudes, roots_of
@@ -71,35 +71,35 @@ def joint_branches(chain: Chain, setting: Setting, *, tol: float, rung: str) -> 
     RungError
         For another rung, more than one setting, or a chain that can be solved in turn.
     """
-    if rung not in ("one_harmonic", "harmonic_balance", "static"):
+    if rung not in RUNGS or not load_rung(rung).lists_branches:
         raise RungError(f"rung {rung}: it does not list every branch; use rung harmonic_balance or auto")
     if len(setting) != 1 or chain.feed_forward:
         raise RungError(f"start all: expected one setting of a ring or bidirectional chain, got {len(setting)}")
     began = time.perf_counter()
     with np.errstate(all="ignore"):
-        stages = Stages.of(chain, setting)
+        scaled = ScaledChain.of(chain, setting)
         if rung == "static":
-            basis, guesses, complete = basis_for(0, True), _static_starts(stages), False
+            basis, guesses, complete = basis_for(0, True), _static_starts(scaled), False
         else:
-            basis = basis_for(1 if rung == "one_harmonic" else FIRST, stages.has_mean)
-            guesses, complete = _starts(stages, basis)
-        many, found, followed = _distinct(stages, basis, guesses, whole=complete)
+            basis = basis_for(1 if rung == "one_harmonic" else FIRST, scaled.has_mean)
+            guesses, complete = _starts(scaled, basis)
+        many, found, followed = _distinct(scaled, basis, guesses, whole=complete)
         response = _refined(many, rung, found, tol, began)
     return Branches(response, complete and followed)
 
 
-def _starts(stages: Stages, basis: Basis) -> tuple[Floats, bool]:
+def _starts(scaled: ScaledChain, basis: Basis) -> tuple[Floats, bool]:
     """Starts (n, d, J) in `basis`, and whether all single-harmonic answers are among them."""
-    listed = roots_of(stages)
+    listed = roots_of(scaled)
     guesses = _coordinates(basis, listed)
-    if listed.complete and not stages.has_mean:
+    if listed.complete and not scaled.has_mean:
         return guesses, True
-    if stages.has_mean:
+    if scaled.has_mean:
         for load in LOADS:
-            lifted = _repeated(stages, guesses.shape[2])
+            lifted = _repeated(scaled, guesses.shape[2])
             moved = newton_joint(replace(lifted, force=load * lifted.force), basis, guesses)
             guesses = np.where(moved.ok, moved.x, guesses)
-    return np.concatenate([guesses, _scattered(stages, basis)], axis=2), False
+    return np.concatenate([guesses, _scattered(scaled, basis)], axis=2), False
 
 
 def _coordinates(basis: Basis, listed: Amplitudes) -> Floats:
@@ -108,16 +108,16 @@ def _coordinates(basis: Basis, listed: Amplitudes) -> Floats:
     return x
 
 
-def _scattered(stages: Stages, basis: Basis) -> Floats:
+def _scattered(scaled: ScaledChain, basis: Basis) -> Floats:
     """Starts with amplitudes on any branch of each oscillator and any phases."""
     rng = np.random.default_rng(SEED)
-    n, count = stages.n, _scatter(stages.n)
-    shape, many = (n, count), _repeated(stages, count)
-    force = np.abs(stages.drive) + rng.uniform(0, 1, shape) * np.abs(stages.lam).max()
+    n, count = scaled.n, _scatter(scaled.n)
+    shape, many = (n, count), _repeated(scaled, count)
+    force = np.abs(scaled.drive) + rng.uniform(0, 1, shape) * np.abs(scaled.lam).max()
     cubic = cubic_of(layer_of(many, np.arange(n)), force.reshape(-1) + 0j)
     roots = np.sqrt(np.stack([cubic.lowest(), cubic.middle(), cubic.highest()]) / (0.75 * np.abs(cubic.strength)))
     size = roots.reshape(3, n, count)[rng.integers(0, 3, shape), np.arange(n)[:, None], np.arange(count)]
-    size = np.where(np.isfinite(size), size, np.abs(stages.drive))
+    size = np.where(np.isfinite(size), size, np.abs(scaled.drive))
     phasor = size * np.exp(2j * np.pi * rng.uniform(0, 1, shape))
     x = np.zeros((n, basis.size, count))
     x[:, 0], x[:, 1] = phasor.real, phasor.imag
@@ -130,10 +130,10 @@ def _scatter(n: int) -> int:
     return max(8, min(SCATTERED, 6 * SCATTERED // n))
 
 
-def _static_starts(stages: Stages) -> Floats:
+def _static_starts(scaled: ScaledChain) -> Floats:
     """Every oscillator in its well or beyond either of its hilltops; a scatter of them where that is too many."""
-    n, sides = stages.n, np.array([-1.0, 0.0, 1.0])
-    top = np.sqrt(np.abs(stages.k[:, 0]) / np.maximum(np.abs(stages.of_each(stages.sign)), 1e-300))
+    n, sides = scaled.n, np.array([-1.0, 0.0, 1.0])
+    top = np.sqrt(np.abs(scaled.k[:, 0]) / np.maximum(np.abs(scaled.of_each(scaled.sign)), 1e-300))
     if 3**n <= SCATTERED:
         picked = np.stack(np.meshgrid(*[sides] * n, indexing="ij")).reshape(n, -1)
     else:
@@ -142,36 +142,36 @@ def _static_starts(stages: Stages) -> Floats:
     return (picked * np.minimum(top, 1e3)[:, None])[:, None]
 
 
-def _repeated(stages: Stages, count: int) -> Stages:
-    return stages.pick(np.zeros(count, dtype=np.intp))
+def _repeated(scaled: ScaledChain, count: int) -> ScaledChain:
+    return scaled.pick(np.zeros(count, dtype=np.intp))
 
 
-def _distinct(stages: Stages, basis: Basis, guesses: Floats, *, whole: bool) -> tuple[Stages, March, bool]:
+def _distinct(scaled: ScaledChain, basis: Basis, guesses: Floats, *, whole: bool) -> tuple[ScaledChain, March, bool]:
     """The different answers Newton finds from `guesses`, by size; and whether there is one for each start.
 
     With `whole` the starts are single-harmonic answers: a start that leads far away has found another's.
     """
-    grown = follow_load(stages, basis)
-    x, steps = _converged(stages, basis, guesses, NEAR if whole else np.inf)
+    grown = follow_load(scaled, basis)
+    x, steps = _converged(scaled, basis, guesses, NEAR if whole else np.inf)
     lost = ~np.isfinite(x).all(axis=(0, 1))
     parts = [grown.x[:, :, grown.ok], x[:, :, ~lost]]
     if whole and lost.any():
-        again, more = _converged(stages, basis, _beside(guesses[:, :, lost]), NEAR)
+        again, more = _converged(scaled, basis, _beside(guesses[:, :, lost]), NEAR)
         parts.append(again[:, :, np.isfinite(again).all(axis=(0, 1))])
         steps += more
     x = _unlike(np.concatenate(parts, axis=2))
     count = x.shape[2]
     if not count:
-        x = np.zeros((stages.n, basis.size, 1))
-    many = _repeated(stages, x.shape[2])
+        x = np.zeros((scaled.n, basis.size, 1))
+    many = _repeated(scaled, x.shape[2])
     ok = np.full(x.shape[2], count > 0)
     found = March(basis, x, ok, branches_of(many, basis, x), grown.steps + steps)
     return many, found, count >= guesses.shape[2]
 
 
-def _converged(stages: Stages, basis: Basis, guesses: Floats, near: float) -> tuple[Floats, int]:
+def _converged(scaled: ScaledChain, basis: Basis, guesses: Floats, near: float) -> tuple[Floats, int]:
     """Where Newton goes from each start, NaN where nowhere or too far; and its steps."""
-    solved = newton_joint(_repeated(stages, guesses.shape[2]), basis, guesses)
+    solved = newton_joint(_repeated(scaled, guesses.shape[2]), basis, guesses)
     size = np.abs(solved.x).max(axis=(0, 1))
     away = np.abs(solved.x - guesses).max(axis=(0, 1)) / np.where(size > 0, size, 1.0)
     return np.where(solved.ok & (away <= near), solved.x, np.nan), solved.steps
@@ -201,21 +201,21 @@ def _unlike(x: Floats) -> Floats:
     return x[:, :, kept]
 
 
-def _refined(stages: Stages, rung: str, found: March, tol: float, began: float) -> Response:
+def _refined(scaled: ScaledChain, rung: str, found: March, tol: float, began: float) -> Response:
     """All branches with as many harmonics as the worst of them needs."""
     branch, steps, before = found.branch, found.steps, np.inf
-    estimate = defect(stages, found.basis, found.x)
+    estimate = defect(scaled, found.basis, found.x)
     while rung == "harmonic_balance" and found.basis.order < LAST:
         worst = float(estimate[found.ok].max(initial=0.0))
         if worst <= tol or worst > 0.5 * before:
             break
         basis, before = finer(found.basis), worst
-        sharper = newton_joint(stages, basis, np.stack([resize(x, found.basis, basis) for x in found.x]))
+        sharper = newton_joint(scaled, basis, np.stack([resize(x, found.basis, basis) for x in found.x]))
         found, steps = replace(sharper, ok=sharper.ok & found.ok), steps + sharper.steps
-        estimate = defect(stages, basis, found.x)
-    outcome = outcomes(len(stages), Outcome.OK)
+        estimate = defect(scaled, basis, found.x)
+    outcome = outcomes(len(scaled), Outcome.OK)
     if rung == "harmonic_balance":
         outcome[~(estimate <= tol)] = Outcome.OUT_OF_BUDGET
     outcome[~found.ok] = Outcome.NO_CONVERGENCE
-    work = Stats(newton_steps=steps, oscillators_solved=stages.n * len(stages))
-    return response_of(stages, rung, Answer(found.basis, found.x, outcome, branch, estimate), work, began)
+    work = Stats(newton_steps=steps, oscillators_solved=scaled.n * len(scaled))
+    return response_of(scaled, rung, Answer(found.basis, found.x, outcome, branch, estimate), work, began)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 
 __all__ = ["Amplitudes", "roots_of"]
 
@@ -31,35 +31,37 @@ class Amplitudes:
     complete: bool
 
 
-def roots_of(stages: Stages) -> Amplitudes:
-    """Every single-harmonic answer of the one setting in `stages`, its constant forces left out."""
-    back = _Back.of(stages)
-    strength = float(abs(stages.drive[0]))
-    phasor = np.zeros((stages.n, 0), dtype=np.complex128)
-    if strength == 0 or stages.linear:
-        return Amplitudes(np.zeros((stages.n, 1), dtype=np.complex128), strength == 0 or stages.linear)
-    top = _largest(stages, strength)
+def roots_of(scaled: ScaledChain) -> Amplitudes:
+    """Every single-harmonic answer of the one setting of `scaled`, its constant forces left out."""
+    if scaled.law.stride not in (0, 1):
+        return Amplitudes(np.zeros((scaled.n, 0), dtype=np.complex128), False)
+    back = _Back.of(scaled)
+    strength = float(abs(scaled.drive[0]))
+    phasor = np.zeros((scaled.n, 0), dtype=np.complex128)
+    if strength == 0 or scaled.linear:
+        return Amplitudes(np.zeros((scaled.n, 1), dtype=np.complex128), strength == 0 or scaled.linear)
+    top = _largest(scaled, strength)
     if not np.isfinite(top):
         return Amplitudes(phasor, False)
     roots, complete = _search(back, strength, top * WIDER)
     if len(roots):
         found, drive = back.profile(roots)
-        turn = stages.drive[0] / drive
-        phasor = np.zeros((stages.n, len(roots)), dtype=np.complex128)
+        turn = scaled.drive[0] / drive
+        phasor = np.zeros((scaled.n, len(roots)), dtype=np.complex128)
         phasor[: back.n] = found * (turn / np.abs(turn))
     return Amplitudes(phasor, complete)
 
 
-def _largest(stages: Stages, strength: float) -> float:
+def _largest(scaled: ScaledChain, strength: float) -> float:
     """A bound of every amplitude; inf where an oscillator without a cubic term might resonate without bound.
 
     At the oscillator of the largest amplitude M, | |3/4 sign| M^2 - |K_0| | M <= (links) M + strength.
     """
-    impedance = np.abs(stages.k[:, 0] - stages.omega[0] ** 2 + 1j * stages.of_each(stages.delta) * stages.omega[0])
-    links = np.zeros(stages.n)
-    for fed, _, link in stages.links():
+    impedance = np.abs(scaled.k[:, 0] - scaled.omega[0] ** 2 + 1j * scaled.of_each(scaled.delta) * scaled.omega[0])
+    links = np.zeros(scaled.n)
+    for fed, _, link in scaled.links():
         links[fed] += np.abs(link[:, 0])
-    cubic = 0.75 * np.abs(stages.of_each(stages.sign))
+    cubic = 0.75 * np.abs(scaled.of_each(scaled.sign))
     # Either M is below the cube root's share, or the quadratic one bounds it: their sum bounds both.
     soft = np.sqrt((impedance + links) / cubic) + np.cbrt(strength / cubic)
     margin = impedance - links
@@ -83,16 +85,16 @@ class _Back:
     closing: float
 
     @classmethod
-    def of(cls, stages: Stages) -> _Back:
-        lam = stages.lam[:, 0]
+    def of(cls, scaled: ScaledChain) -> _Back:
+        lam = scaled.lam[:, 0]
         cut = np.flatnonzero(lam[1:] == 0)
-        n = int(cut[0]) + 1 if len(cut) else stages.n
-        omega = float(stages.omega[0])
-        stiff = stages.k[:n, 0] - omega**2 + 1j * stages.of_each(stages.delta)[:n] * omega
-        other = np.zeros(n) if stages.other is None else stages.other[:n, 0].copy()
+        n = int(cut[0]) + 1 if len(cut) else scaled.n
+        omega = float(scaled.omega[0])
+        stiff = scaled.k[:n, 0] - omega**2 + 1j * scaled.of_each(scaled.delta)[:n] * omega
+        other = np.zeros(n) if scaled.other is None else scaled.other[:n, 0].copy()
         other[-1] = 0.0
-        closing = float(lam[0]) if stages.ring and n == stages.n else 0.0
-        return cls(n, stiff, 0.75 * stages.of_each(stages.sign)[:n], lam[:n], other, closing)
+        closing = float(lam[0]) if scaled.law.closed and n == scaled.n else 0.0
+        return cls(n, stiff, 0.75 * scaled.of_each(scaled.sign)[:n], lam[:n], other, closing)
 
     def profile(self, a: Floats) -> tuple[Complexes, Complexes]:
         """Amplitudes (n, J) with the last one `a` (J,), and the drives (J,) they take."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for, resize
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Branch
 from .balance import Oscillator, linearise, newton, solve_blocks
 from .single import march_alone
@@ -42,44 +42,42 @@ class March:
     steps: int
 
 
-def oscillator(stages: Stages, m: int) -> Oscillator:
+def oscillator(scaled: ScaledChain, m: int) -> Oscillator:
     """Oscillator m of every setting."""
-    delta, sign = (each[m] if len(each) > 1 else each[0] for each in (stages.delta, stages.sign))
-    return Oscillator(stages.omega, stages.k[m], delta, sign)
+    delta, sign = (each[m] if len(each) > 1 else each[0] for each in (scaled.delta, scaled.sign))
+    return Oscillator(scaled.omega, scaled.k[m], delta, sign)
 
 
-def layer_of(stages: Stages, layer: Wholes) -> Oscillator:
+def layer_of(scaled: ScaledChain, layer: Wholes) -> Oscillator:
     """The oscillators `layer` of every setting, side by side: (M, N) lanes become M N."""
     if len(layer) == 1:
-        return oscillator(stages, int(layer[0]))
-    delta, sign = (np.repeat(stages.of_each(value)[layer], len(stages)) for value in (stages.delta, stages.sign))
-    return Oscillator(np.tile(stages.omega, len(layer)), stages.k[layer].reshape(-1), delta, sign)
+        return oscillator(scaled, int(layer[0]))
+    delta, sign = (np.repeat(scaled.of_each(value)[layer], len(scaled)) for value in (scaled.delta, scaled.sign))
+    return Oscillator(np.tile(scaled.omega, len(layer)), scaled.k[layer].reshape(-1), delta, sign)
 
 
-def push(stages: Stages, basis: Basis, m: int, before: Floats | None, above: Floats | None = None) -> Floats:
-    """Force on oscillator m; float64, shape (d, N). `before` and `above` are the series of those that feed it."""
-    force = np.zeros((basis.size, len(stages))) if before is None else stages.lam[m] * before
+def push(scaled: ScaledChain, basis: Basis, m: int, x: Floats) -> Floats:
+    """Force on oscillator m under the series x (n, d, N) of those that feed it; float64, shape (d, N)."""
+    pulls = [link * x[source] for source, link in scaled.inputs(m)]
+    force: Floats = pulls[0] if pulls else np.zeros((basis.size, len(scaled)))
+    for pull in pulls[1:]:
+        force += pull
     if m == 0 and basis.order:
-        force[0], force[1] = stages.drive.real, stages.drive.imag
-    if above is not None and stages.other is not None:
-        force += stages.other[m] * above
+        force[0], force[1] = scaled.drive.real, scaled.drive.imag
     if basis.mean:
-        force[-1] += stages.force[m]
+        force[-1] += scaled.force[m]
     return force
 
 
-def push_layer(stages: Stages, basis: Basis, layer: Wholes, x: Floats) -> Floats:
+def push_layer(scaled: ScaledChain, basis: Basis, layer: Wholes, x: Floats) -> Floats:
     """Force on the oscillators `layer`, side by side; float64, shape (d, M N)."""
     if len(layer) == 1:
-        m = int(layer[0])
-        above = x[m + stages.stride] if m >= -stages.stride > 0 else None
-        return push(stages, basis, m, x[m - 1] if m else None, above)
-    force = np.zeros((len(layer), basis.size, len(stages)))
-    for links, source in ((stages.lam, layer - 1), (stages.other, layer + stages.stride)):
-        if links is not None:
-            force += links[layer][:, None] * np.where((source >= 0)[:, None, None], x[np.maximum(source, 0)], 0.0)
+        return push(scaled, basis, int(layer[0]), x)
+    force = np.zeros((len(layer), basis.size, len(scaled)))
+    for links, source in scaled.feeds(layer):
+        force += links[:, None] * np.where((source >= 0)[:, None, None], x[np.maximum(source, 0)], 0.0)
     if basis.mean:
-        force[:, -1] += stages.force[layer]
+        force[:, -1] += scaled.force[layer]
     return _side_by_side(force)
 
 
@@ -99,21 +97,21 @@ def cubic_of(osc: Oscillator, force: Complexes) -> Cubic:
     return Cubic.of(osc.k - osc.omega * osc.omega, osc.delta * osc.omega, osc.sign, force)
 
 
-def march(stages: Stages, basis: Basis, guide: Floats | None = None) -> March:
+def march(scaled: ScaledChain, basis: Basis, guide: Floats | None = None) -> March:
     """Solve the chain in `basis`, on the lower branch, or from the coordinates `guide` (n, d, N)."""
-    if len(stages) == 1 and guide is None and basis is basis_for(3, False) and not stages.linear and not stages.stride:
-        alone = march_alone(stages)
+    if len(scaled) == 1 and guide is None and basis is basis_for(3, False) and not scaled.linear and scaled.law.in_line:
+        alone = march_alone(scaled)
         if alone is not None:
             series, count = alone
-            return March(basis, series, np.ones(1, dtype=bool), branches_of(stages, basis, series), count)
+            return March(basis, series, np.ones(1, dtype=bool), branches_of(scaled, basis, series), count)
     # Where a row of a grid begins the link from the end of the row before is 0, and what it multiplies must be finite.
-    x = np.zeros((stages.n, basis.size, len(stages)))
-    ok = np.ones(len(stages), dtype=bool)
-    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
-    steps, size, lanes = 0, len(stages), basis.size
-    for layer in stages.layers:
-        osc, force = layer_of(stages, layer), push_layer(stages, basis, layer, x)
-        cubic = cubic_of(osc, first_phasor(force)) if basis.order and not stages.linear else None
+    x = np.zeros((scaled.n, basis.size, len(scaled)))
+    ok = np.ones(len(scaled), dtype=bool)
+    branch = np.zeros((scaled.n, len(scaled)), dtype=np.int8)
+    steps, size, lanes = 0, len(scaled), basis.size
+    for layer in scaled.layers:
+        osc, force = layer_of(scaled, layer), push_layer(scaled, basis, layer, x)
+        cubic = cubic_of(osc, first_phasor(force)) if basis.order and not scaled.linear else None
         start = _side_by_side(guide[layer]) if guide is not None else _low_start(osc, basis, force, cubic)
         solved = newton(basis, osc, force, start)
         steps += solved.steps
@@ -124,15 +122,15 @@ def march(stages: Stages, basis: Basis, guide: Floats | None = None) -> March:
     return March(basis, x, ok, branch, steps)
 
 
-def correct(stages: Stages, basis: Basis, x: Floats, old: Basis) -> Floats:
+def correct(scaled: ScaledChain, basis: Basis, x: Floats, old: Basis) -> Floats:
     """One Newton step of the whole chain in `basis` from x (n, d, N) in `old`; errors travel down the chain."""
-    moved = np.zeros((stages.n, basis.size, len(stages)))
-    for layer in stages.layers:
-        osc = layer_of(stages, layer)
+    moved = np.zeros((scaled.n, basis.size, len(scaled)))
+    for layer in scaled.layers:
+        osc = layer_of(scaled, layer)
         here = resize(_side_by_side(x[layer]), old, basis)
         jacobian, twice = linearise(basis, osc.coefficients(basis), osc.sign, here)
-        found = solve_blocks(jacobian, push_layer(stages, basis, layer, moved) + twice)
-        moved[layer] = found.reshape(basis.size, -1, len(stages)).transpose(1, 0, 2)
+        found = solve_blocks(jacobian, push_layer(scaled, basis, layer, moved) + twice)
+        moved[layer] = found.reshape(basis.size, -1, len(scaled)).transpose(1, 0, 2)
     return moved
 
 
@@ -170,44 +168,44 @@ def classify(cubic: Cubic, phasor: Complexes) -> NDArray[np.int8]:
     return label
 
 
-def branches_of(stages: Stages, basis: Basis, x: Floats) -> NDArray[np.int8]:
+def branches_of(scaled: ScaledChain, basis: Basis, x: Floats) -> NDArray[np.int8]:
     """`Branch` of each oscillator given its input; int8, shape (n, N)."""
-    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
-    if not basis.order or stages.linear:
+    branch = np.zeros((scaled.n, len(scaled)), dtype=np.int8)
+    if not basis.order or scaled.linear:
         return branch
     phasor = x[:, 0] + 1j * x[:, 1]
     force = np.zeros_like(phasor)
-    force[0] = stages.drive
-    for fed, source, link in stages.links():
+    force[0] = scaled.drive
+    for fed, source, link in scaled.links():
         force[fed] += link * phasor[source]
-    label = classify(cubic_of(layer_of(stages, np.arange(stages.n)), force.reshape(-1)), phasor.reshape(-1))
+    label = classify(cubic_of(layer_of(scaled, np.arange(scaled.n)), force.reshape(-1)), phasor.reshape(-1))
     return label.reshape(branch.shape)
 
 
-def past_fold(stages: Stages, basis: Basis, x: Floats) -> Bools:
+def past_fold(scaled: ScaledChain, basis: Basis, x: Floats) -> Bools:
     """Whether any oscillator is beyond the fold where the branch that starts at 0 ends; bool, shape (N,).
 
     Between the two folds of the cubic lies its inflection: the branch from 0 is below it.
     """
-    past = np.zeros(len(stages), dtype=bool)
-    if not basis.order or stages.linear:
+    past = np.zeros(len(scaled), dtype=bool)
+    if not basis.order or scaled.linear:
         return past
-    for m in range(stages.n):
-        here, osc = x[m, :, :], oscillator(stages, m)
+    for m in range(scaled.n):
+        here, osc = x[m, :, :], oscillator(scaled, m)
         # In units of the oscillator's own cubic term.
         v = 0.75 * np.abs(osc.sign) * (here[0] ** 2 + here[1] ** 2)
         stiffness = osc.k + 3 * osc.sign * (here[-1] ** 2 if basis.mean else 0.0)
-        bend = np.sign(osc.sign) * (stages.omega**2 - stiffness)
-        past |= (bend > np.sqrt(3) * osc.delta * stages.omega) & (v > 2 * bend / 3)
+        bend = np.sign(osc.sign) * (scaled.omega**2 - stiffness)
+        past |= (bend > np.sqrt(3) * osc.delta * scaled.omega) & (v > 2 * bend / 3)
     return past
 
 
-def means_under(stages: Stages, phasor: Complexes) -> Floats:
+def means_under(scaled: ScaledChain, phasor: Complexes) -> Floats:
     """Mean of every oscillator that vibrates with `phasor` (n, N); float64, shape (n, N), 0 where none is known."""
-    means = np.zeros((stages.n, len(stages)))
-    for m in range(stages.n):
-        constant, osc = stages.force[m], oscillator(stages, m)
-        for source, link in stages.inputs(m):
+    means = np.zeros((scaled.n, len(scaled)))
+    for m in range(scaled.n):
+        constant, osc = scaled.force[m], oscillator(scaled, m)
+        for source, link in scaled.inputs(m):
             constant = constant + link * means[source]
         stiffness = osc.k + 1.5 * osc.sign * np.abs(phasor[m]) ** 2
         means[m] = np.nan_to_num(mean_of(stiffness, osc.sign, constant))

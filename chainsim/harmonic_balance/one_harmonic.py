@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import basis_for
-from ..equations.scaling import Stages
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
 from ..rung import Rung, Start
 from .answer import Answer, defect, outcomes, response_of
 from .branches import all_branches
-from .harmonic_balance import branch_refusal, lower_branch
+from .rung import branch_refusal, lower_branch
 
 __all__ = ["OneHarmonicRung"]
 
@@ -25,6 +25,8 @@ class OneHarmonicRung(Rung):
     name = "one_harmonic"
     order = "O(beta^2 a^4) over the distance to the fold"
     valid = "beta a^2 << 1 (the third harmonic is beta a^2 / 32 of the first)"
+    models = frozenset({"nonlinearity"})
+    lists_branches = True
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""
@@ -33,27 +35,27 @@ class OneHarmonicRung(Rung):
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
         """The lower branch (rest, ramp) or every branch (all)."""
         began = time.perf_counter()
-        stages = Stages.of(chain, setting)
-        basis = basis_for(1, stages.has_mean)
-        found = all_branches(stages, basis) if start is Start.ALL else lower_branch(stages, basis, start)
+        scaled = ScaledChain.of(chain, setting)
+        basis = basis_for(1, scaled.has_mean)
+        found = all_branches(scaled, basis) if start is Start.ALL else lower_branch(scaled, basis, start)
         if start is Start.ALL:
-            stages = stages.pick(np.zeros(len(found.ok), dtype=np.intp))
-        outcome = outcomes(len(stages), Outcome.OK)
+            scaled = scaled.pick(np.zeros(len(found.ok), dtype=np.intp))
+        outcome = outcomes(len(scaled), Outcome.OK)
         outcome[~found.ok] = Outcome.NO_CONVERGENCE
-        flow = None if basis.mean or stages.joint else _slow_flow(stages, found.x)
-        answer = Answer(basis, found.x, outcome, found.branch, defect(stages, basis, found.x), flow)
-        work = Stats(newton_steps=found.steps, oscillators_solved=stages.n * len(stages))
-        return response_of(stages, self.name, answer, work, began)
+        flow = None if basis.mean or scaled.joint else _slow_flow(scaled, found.x)
+        answer = Answer(basis, found.x, outcome, found.branch, defect(scaled, basis, found.x), flow)
+        work = Stats(newton_steps=found.steps, oscillators_solved=scaled.n * len(scaled))
+        return response_of(scaled, self.name, answer, work, began)
 
 
-def _slow_flow(stages: Stages, x: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _slow_flow(scaled: ScaledChain, x: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Multipliers of ``2 i omega A' = F - (kappa + 3/4 sign |A|^2 + i delta omega) A``; shape (N, n, 2).
 
     The exponents are -delta/2 +- sqrt(-kappa_1 kappa_3)/(2 omega), kappa_j = kappa + j sign 3/4 |A|^2: stable while the
     cubic's slope (delta omega)^2 + kappa_1 kappa_3 is positive.
     """
-    kappa = stages.k - stages.omega**2
-    v = 0.75 * stages.sign * (x[:, 0] ** 2 + x[:, 1] ** 2)
-    spread = np.sqrt(-(kappa + v) * (kappa + 3 * v) + 0j) / (2 * stages.omega)
-    exponents = np.stack([-0.5 * stages.delta + spread, -0.5 * stages.delta - spread])
-    return np.exp(exponents * (2 * np.pi / stages.omega)).transpose(2, 1, 0)
+    kappa = scaled.k - scaled.omega**2
+    v = 0.75 * scaled.sign * (x[:, 0] ** 2 + x[:, 1] ** 2)
+    spread = np.sqrt(-(kappa + v) * (kappa + 3 * v) + 0j) / (2 * scaled.omega)
+    exponents = np.stack([-0.5 * scaled.delta + spread, -0.5 * scaled.delta - spread])
+    return np.exp(exponents * (2 * np.pi / scaled.omega)).transpose(2, 1, 0)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis, basis_for
-from ..equations.scaling import Stages
-from ..model.chain import Chain, CouplingKind, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Response
 from ..rung import RungError
 from .balance import Oscillator, linearise
@@ -51,50 +51,46 @@ def gradient(chain: Chain, setting: Setting, response: Response) -> Gradient:
     RungError
         For a ring, a bidirectional chain or a grid.
     """
-    if not chain.feed_forward or chain.rows > 1:
+    if not chain.law.in_line:
         raise RungError("gradient: open chains only; a ring, bidirectional chain or grid has no sequential form")
-    stages = Stages.of(chain, setting)
+    scaled = ScaledChain.of(chain, setting)
     if response.rung == "linear":
-        stages = replace(stages, sign=np.zeros((1, 1)))
-    basis, x = _series(stages, response)
+        scaled = replace(scaled, sign=np.zeros((1, 1)))
+    basis, x = _series(scaled, response)
     with np.errstate(all="ignore"):
-        back = chain.kind is CouplingKind.RESISTOR
-        table = _along(stages, basis, x, np.exp(1j * setting.phase), back)
+        table = _along(scaled, basis, x, np.exp(1j * setting.phase))
     # The drive column is per scaled epsilon = epsilon * length, and phasors are x / length: the length cancels.
-    table[:, :, 1:] /= stages.length
+    table[:, :, 1:] /= scaled.length
     table.flags.writeable = False
-    n = stages.n
+    n = scaled.n
     return Gradient(table[:, :, 0], table[:, :, 1:n], table[:, :, n])
 
 
-def _along(stages: Stages, basis: Basis, x: Floats, turn: Complexes, back: bool) -> Complexes:
-    """d phasor of every oscillator by scaled epsilon, the links 1..n-1 and omega; shape (N, n, n + 1).
-
-    `back` : whether links have the term - lam_m z_m.
-    """
-    n, size = stages.n, len(stages)
+def _along(scaled: ScaledChain, basis: Basis, x: Floats, turn: Complexes) -> Complexes:
+    """d phasor of every oscillator by scaled epsilon, the links 1..n-1 and omega; shape (N, n, n + 1)."""
+    n, size = scaled.n, len(scaled)
     change = np.zeros((size, basis.size, n + 1))
     table = np.empty((size, n, n + 1), dtype=np.complex128)
     for m in range(n):
-        osc = oscillator(stages, m)
+        osc = oscillator(scaled, m)
         jacobian = linearise(basis, osc.coefficients(basis), osc.sign, x[m])[0].transpose(2, 0, 1)
-        change = stages.lam[m][:, None, None] * change
+        change = scaled.lam[m][:, None, None] * change
         if m == 0:
             change[:, 0, 0], change[:, 1, 0] = turn.real, turn.imag
         else:
-            change[:, :, m] = (x[m - 1] - x[m] if back else x[m - 1]).T
+            change[:, :, m] = (x[m - 1] - scaled.law.back * x[m]).T
         change[:, :, n] -= _by_omega(osc, basis, x[m])
         change = _solve(jacobian, change)
         table[:, m] = change[:, 0] + 1j * change[:, 1]
     return table
 
 
-def _series(stages: Stages, response: Response) -> tuple[Basis, Floats]:
+def _series(scaled: ScaledChain, response: Response) -> tuple[Basis, Floats]:
     order = response.harmonics.shape[1]
     even = bool(np.nan_to_num(response.harmonics[:, 1::2]).any() or np.nan_to_num(response.mean).any())
-    basis = basis_for(order, even or stages.has_mean)
-    harmonics = response.harmonics.transpose(1, 2, 0) * stages.length
-    x = basis.coordinates(harmonics, response.mean.T * stages.length)
+    basis = basis_for(order, even or scaled.has_mean)
+    harmonics = response.harmonics.transpose(1, 2, 0) * scaled.length
+    x = basis.coordinates(harmonics, response.mean.T * scaled.length)
     return basis, np.ascontiguousarray(x.transpose(1, 0, 2))
 
 

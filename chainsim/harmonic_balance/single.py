@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 from .starts import newton_of_one
 
 __all__ = ["first_alone", "linear_alone", "march_alone", "still_alone"]
@@ -21,13 +21,13 @@ MAX_STEPS = 25
 SMALL_STEP = 1e-10
 
 
-def march_alone(stages: Stages) -> tuple[NDArray[np.float64], int] | None:
+def march_alone(scaled: ScaledChain) -> tuple[NDArray[np.float64], int] | None:
     """Lower branch of the one setting: x (n, 4, 1) and the Newton steps; None where it does not converge."""
-    omega = float(stages.omega[0])
-    deltas, signs = stages.of_each(stages.delta).tolist(), stages.of_each(stages.sign).tolist()
-    first, third = complex(stages.drive[0]), 0j
-    x, steps = np.empty((stages.n, 4, 1)), 0
-    for m, (k, lam) in enumerate(zip(stages.k[:, 0].tolist(), stages.lam[:, 0].tolist(), strict=True)):
+    omega = float(scaled.omega[0])
+    deltas, signs = scaled.of_each(scaled.delta).tolist(), scaled.of_each(scaled.sign).tolist()
+    first, third = complex(scaled.drive[0]), 0j
+    x, steps = np.empty((scaled.n, 4, 1)), 0
+    for m, (k, lam) in enumerate(zip(scaled.k[:, 0].tolist(), scaled.lam[:, 0].tolist(), strict=True)):
         if m:
             first, third = lam * first, lam * third
         near = complex(k - omega * omega, deltas[m] * omega)
@@ -43,27 +43,27 @@ def march_alone(stages: Stages) -> tuple[NDArray[np.float64], int] | None:
     return x, steps
 
 
-def first_alone(stages: Stages) -> tuple[NDArray[np.float64], int] | None:
+def first_alone(scaled: ScaledChain) -> tuple[NDArray[np.float64], int] | None:
     """The same with the first harmonic alone: x (n, 2, 1)."""
-    omega = float(stages.omega[0])
-    deltas, signs = stages.of_each(stages.delta).tolist(), stages.of_each(stages.sign).tolist()
-    first, x = complex(stages.drive[0]), np.empty((stages.n, 2, 1))
-    for m, (k, lam) in enumerate(zip(stages.k[:, 0].tolist(), stages.lam[:, 0].tolist(), strict=True)):
+    omega = float(scaled.omega[0])
+    deltas, signs = scaled.of_each(scaled.delta).tolist(), scaled.of_each(scaled.sign).tolist()
+    first, x = complex(scaled.drive[0]), np.empty((scaled.n, 2, 1))
+    for m, (k, lam) in enumerate(zip(scaled.k[:, 0].tolist(), scaled.lam[:, 0].tolist(), strict=True)):
         near = complex(k - omega * omega, deltas[m] * omega)
         try:
             first = _first(near, signs[m], lam * first if m else first)
         except (OverflowError, ZeroDivisionError):
             return None
         x[m, :, 0] = first.real, first.imag
-    return (x, stages.n) if np.isfinite(x).all() else None
+    return (x, scaled.n) if np.isfinite(x).all() else None
 
 
-def linear_alone(stages: Stages, mean: bool) -> NDArray[np.float64]:
+def linear_alone(scaled: ScaledChain, mean: bool) -> NDArray[np.float64]:
     """First harmonic, and the mean last where there is one, without the cubic term: x (n, 2 or 3, 1)."""
-    omega = float(stages.omega[0])
-    near = (stages.k[:, 0] - omega * omega + 1j * stages.of_each(stages.delta) * omega).tolist()
-    first, still, x = complex(stages.drive[0]), 0.0, np.empty((stages.n, 2 + mean, 1))
-    each = zip(near, stages.k[:, 0].tolist(), stages.lam[:, 0].tolist(), stages.force[:, 0].tolist(), strict=True)
+    omega = float(scaled.omega[0])
+    near = (scaled.k[:, 0] - omega * omega + 1j * scaled.of_each(scaled.delta) * omega).tolist()
+    first, still, x = complex(scaled.drive[0]), 0.0, np.empty((scaled.n, 2 + mean, 1))
+    each = zip(near, scaled.k[:, 0].tolist(), scaled.lam[:, 0].tolist(), scaled.force[:, 0].tolist(), strict=True)
     for m, (impedance, k, lam, force) in enumerate(each):
         push, still = lam * first if m else first, force + lam * still
         first = push / impedance if impedance else complex(math.nan, math.nan)
@@ -74,10 +74,10 @@ def linear_alone(stages: Stages, mean: bool) -> NDArray[np.float64]:
     return x
 
 
-def still_alone(stages: Stages) -> tuple[NDArray[np.float64], int] | None:
+def still_alone(scaled: ScaledChain) -> tuple[NDArray[np.float64], int] | None:
     """Equilibria that grow from rest with their force: x (n, 1, 1); None past a fold."""
-    signs, still, x, steps = stages.of_each(stages.sign).tolist(), 0.0, np.zeros((stages.n, 1, 1)), 0
-    each = zip(stages.k[:, 0].tolist(), stages.lam[:, 0].tolist(), stages.force[:, 0].tolist(), signs, strict=True)
+    signs, still, x, steps = scaled.of_each(scaled.sign).tolist(), 0.0, np.zeros((scaled.n, 1, 1)), 0
+    each = zip(scaled.k[:, 0].tolist(), scaled.lam[:, 0].tolist(), scaled.force[:, 0].tolist(), signs, strict=True)
     for m, (k, lam, force, sign) in enumerate(each):
         push, still = force + lam * still, 0.0
         for _ in range(MAX_STEPS):

@@ -7,13 +7,13 @@ import time
 import numpy as np
 
 from ..equations.basis import basis_for
-from ..equations.scaling import Stages
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
-from ..rung import Rung, Start
+from ..rung import TERMS, Rung, Start
 from .answer import Answer, defect, outcomes, response_of
 from .branches import all_branches
-from .harmonic_balance import branch_refusal, lower_branch
+from .rung import branch_refusal, lower_branch
 
 __all__ = ["StaticRung"]
 
@@ -28,6 +28,8 @@ class StaticRung(Rung):
     name = "static"
     order = "exact without a drive; else O(epsilon)"
     valid = "bias and preload only"
+    models = TERMS
+    lists_branches = True
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""
@@ -36,16 +38,16 @@ class StaticRung(Rung):
     def steady(self, chain: Chain, setting: Setting, *, tol: float, start: Start) -> Response:
         """The equilibrium that grows from rest, or every equilibrium (all)."""
         began = time.perf_counter()
-        stages = Stages.of(chain, setting)
+        scaled = ScaledChain.of(chain, setting)
         basis = basis_for(0, True)
-        found = all_branches(stages, basis) if start is Start.ALL else lower_branch(stages, basis, Start.REST)
+        found = all_branches(scaled, basis) if start is Start.ALL else lower_branch(scaled, basis, Start.REST)
         if start is Start.ALL:
-            stages = stages.pick(np.zeros(len(found.ok), dtype=np.intp))
-        outcome = outcomes(len(stages), Outcome.OK)
+            scaled = scaled.pick(np.zeros(len(found.ok), dtype=np.intp))
+        outcome = outcomes(len(scaled), Outcome.OK)
         if start is not Start.ALL:
             # Newton from 0 climbs to the equilibrium in the well and finds none, or one outside it, past the fold.
-            held = (stages.k + 3 * stages.sign * found.x[:, 0] ** 2 > 0).all(axis=0)
-            outcome[~(found.ok & held)] = Outcome.ESCAPED if stages.softens else Outcome.NO_CONVERGENCE
-        answer = Answer(basis, found.x, outcome, found.branch, defect(stages, basis, found.x))
-        work = Stats(newton_steps=found.steps, oscillators_solved=stages.n * len(stages))
-        return response_of(stages, self.name, answer, work, began)
+            held = (scaled.k + 3 * scaled.sign * found.x[:, 0] ** 2 > 0).all(axis=0)
+            outcome[~(found.ok & held)] = Outcome.ESCAPED if scaled.softens else Outcome.NO_CONVERGENCE
+        answer = Answer(basis, found.x, outcome, found.branch, defect(scaled, basis, found.x))
+        work = Stats(newton_steps=found.steps, oscillators_solved=scaled.n * len(scaled))
+        return response_of(scaled, self.name, answer, work, began)

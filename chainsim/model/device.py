@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ..equations.chain import Chain
+from ..equations.coupling import Closure, law_of
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .chain import Chain, Closure
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
@@ -60,7 +61,7 @@ class Coupling(_Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Coupling:
-        if self.closure is Closure.BIDIRECTIONAL:
+        if not law_of(self.closure).plain:
             raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
         if self.scope == "none" and self.lam.max > 0:
             raise ValueError("scope none has no lam; remove lam or choose scope chain or link")

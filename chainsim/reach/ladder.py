@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import basis_for
-from ..equations.scaling import Stages
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.answer import Answer, response_of, stitch
-from ..harmonic_balance.harmonic_balance import balance_near
 from ..harmonic_balance.long import LONG, low_alone
-from ..model.chain import Chain, Setting
+from ..harmonic_balance.rung import balance_near
 from ..model.response import Outcome, Response, Stats
 from ..rung import MAX_PERIODS, Start, load_rung
 from .rest import sure_from_rest
 
-__all__ = ["solve"]
+if TYPE_CHECKING:
+    from ..harmonic_balance.joint_branches import Branches
+
+__all__ = ["every_branch", "lists_jointly", "solve"]
 
 # Distance, relative to each oscillator, at which the answer of harmonic balance is the orbit that was integrated (known
 # to 1e-5). Two orbits may differ in the far end of a chain alone; FAINT of the largest oscillator nothing is seen.
@@ -26,8 +30,6 @@ SAME_ORBIT = 1e-2
 FAINT = 1e-8
 # Of the hilltop, for a mean: a sudden force swings to twice as far and more, and at 0.2955 it throws it over.
 THROWN = 0.25
-# Rungs that list every branch, also of oscillators that act on each other.
-LISTED = ("static", "one_harmonic", "harmonic_balance")
 
 
 def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
@@ -60,27 +62,43 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         raise ValueError("setting: expected at least one setting, got none")
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
-    if way is Start.ALL and chain.betas.any() and not chain.feed_forward and rung in ("auto", *LISTED):
-        from ..harmonic_balance.joint_branches import joint_branches
-
-        name = rung if rung != "auto" else _first(setting)
-        return joint_branches(chain, setting, tol=tol, rung=name).response
+    if way is Start.ALL and lists_jointly(chain, rung):
+        return every_branch(chain, setting, tol=tol, rung=rung).response
     if rung != "auto":
         return load_rung(rung).solve(chain, setting, tol=tol, start=way)
     if not chain.betas.any():
         return _linear(chain, setting, tol, way)
     if way is Start.ALL:
-        return load_rung(_first(setting)).solve(chain, setting, tol=tol, start=way)
+        return load_rung(_listing(setting)).solve(chain, setting, tol=tol, start=way)
     steady = _cheapest(chain, setting, tol, way)
     if way is Start.REST:
         return _from_rest(chain, setting, tol, steady)
-    from .envelope_ramp import from_ramp
+    from .ramp import from_ramp
 
     return from_ramp(chain, setting, steady, tol=tol, max_periods=MAX_PERIODS)
 
 
-def _first(setting: Setting) -> str:
-    """The rung that lists every branch."""
+def lists_jointly(chain: Chain, rung: str) -> bool:
+    """Whether `every_branch` answers start all: a rung, or auto, that lists the branches of all oscillators at once."""
+    joint = bool(chain.betas.any()) and not chain.feed_forward
+    return joint and (rung == "auto" or load_rung(rung).lists_branches)
+
+
+def every_branch(chain: Chain, setting: Setting, *, tol: float, rung: str) -> Branches:
+    """`joint_branches` by a rung, or by the one that ``auto`` takes.
+
+    Raises
+    ------
+    RungError
+        As `joint_branches`.
+    """
+    from ..harmonic_balance.joint_branches import joint_branches
+
+    return joint_branches(chain, setting, tol=tol, rung=rung if rung != "auto" else _listing(setting))
+
+
+def _listing(setting: Setting) -> str:
+    """The rung by which ``auto`` lists every branch."""
     return "harmonic_balance" if setting.epsilon.any() else "static"
 
 
@@ -146,20 +164,20 @@ def _sure(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]
     if chain.n <= LONG:
         return sure_from_rest(chain, setting, steady) & _held(chain, setting, steady)
     sure = np.zeros(len(setting), dtype=bool)
-    if not chain.feed_forward or chain.rows > 1 or setting.preload.any() or setting.bias.any():
+    if not chain.law.in_line or setting.preload.any() or setting.bias.any():
         return sure
     for index in np.flatnonzero(steady.stable):
-        stages = Stages.of(chain, setting[index : index + 1])
+        scaled = ScaledChain.of(chain, setting[index : index + 1])
         with np.errstate(all="ignore"):
-            sure[index] = low_alone(stages, steady.phasor[index] * stages.length)
+            sure[index] = low_alone(scaled, steady.phasor[index] * scaled.length)
     return sure
 
 
 def _held(chain: Chain, setting: Setting, steady: Response) -> NDArray[np.bool_]:
     """Whether constant forces that set in suddenly cannot throw an oscillator out of its well; bool, shape (N,)."""
-    stages = Stages.of(chain, setting)
-    top = np.sqrt(np.maximum(stages.k, 0.0) / np.maximum(-stages.sign, 1e-300))
-    return np.asarray((np.abs(steady.mean.T) * stages.length <= THROWN * top).all(axis=0))
+    scaled = ScaledChain.of(chain, setting)
+    top = np.sqrt(np.maximum(scaled.k, 0.0) / np.maximum(-scaled.sign, 1e-300))
+    return np.asarray((np.abs(steady.mean.T) * scaled.length <= THROWN * top).all(axis=0))
 
 
 def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArray[np.intp], Response]]:
@@ -193,14 +211,14 @@ def _integrated(chain: Chain, setting: Setting, tol: float) -> list[tuple[NDArra
 
 
 def _unanswered(chain: Chain, setting: Setting, outcome: NDArray[np.object_]) -> Response:
-    stages = Stages.of(chain, setting)
+    scaled = ScaledChain.of(chain, setting)
     basis = basis_for(1, False)
-    nothing = np.full((stages.n, basis.size, len(stages)), np.nan)
-    unknown = np.full((len(stages), stages.n, 2), np.nan, dtype=np.complex128)
-    branch = np.zeros((stages.n, len(stages)), dtype=np.int8)
-    estimate = np.full(len(stages), np.inf)
+    nothing = np.full((scaled.n, basis.size, len(scaled)), np.nan)
+    unknown = np.full((len(scaled), scaled.n, 2), np.nan, dtype=np.complex128)
+    branch = np.zeros((scaled.n, len(scaled)), dtype=np.int8)
+    estimate = np.full(len(scaled), np.inf)
     answer = Answer(basis, nothing, outcome, branch, estimate, unknown)
-    silent = response_of(stages, "ode", answer, Stats(), 0.0)
+    silent = response_of(scaled, "ode", answer, Stats(), 0.0)
     return replace(silent, stats=Stats())
 
 

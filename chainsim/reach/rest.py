@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..averaging.decide import FEW, MOST_DECIDED, decide
-from ..equations.scaling import Stages
+from ..equations.chain import Chain, Setting, Spread
+from ..equations.scaled_chain import ScaledChain
 from ..floquet.monodromy import MOST_JOINT, rest_matrix
 from ..harmonic_balance.march import cubic_of, oscillator
-from ..model.chain import Chain, Setting, Spread
 from ..model.response import Response
 from ..rung import Start
 
@@ -35,14 +35,14 @@ def sure_from_rest(chain: Chain, setting: Setting, response: Response) -> Bools:
     the softening well, and every oscillator with more than one answer keeps well below its fold. Else the envelope
     follows the chain as far as that is not so. A False is no verdict, it asks for an integration.
     """
-    stages = Stages.of(chain, setting)
+    scaled = ScaledChain.of(chain, setting)
     sure: Bools
     with np.errstate(all="ignore"):
-        if stages.joint or chain.rows > 1:
-            sure = response.stable & _contracting(stages, response)
-            depth = np.where(sure, 0, stages.n).astype(np.int64)
+        if not scaled.law.in_line:
+            sure = response.stable & _contracting(scaled, response)
+            depth = np.where(sure, 0, scaled.n).astype(np.int64)
         else:
-            depth = _depth(stages, response)
+            depth = _depth(scaled, response)
             sure = np.asarray(response.stable & (depth == 0), dtype=np.bool_)
     known = response.stable & np.isfinite(response.phasor).all(axis=1) & (np.abs(response.phasor) > 0).all(axis=1)
     asked = ~sure & known & (depth <= MOST_DECIDED)
@@ -55,16 +55,16 @@ def sure_from_rest(chain: Chain, setting: Setting, response: Response) -> Bools:
     return sure
 
 
-def _depth(stages: Stages, response: Response) -> NDArray[np.int64]:
+def _depth(scaled: ScaledChain, response: Response) -> NDArray[np.int64]:
     """How many oscillators from the head a chain has to the last that no bound decides; int64, shape (N,)."""
-    size = np.abs(response.phasor.T) * stages.length
-    mean = np.abs(response.mean.T) * stages.length
-    peak = _peaks(stages, size + mean) + size + mean
-    top = np.sqrt(np.maximum(stages.k, 0.0) / np.where(stages.sign < 0, -stages.sign, 1.0))
-    top[np.broadcast_to(stages.sign >= 0, top.shape)] = 1.0
-    depth = np.zeros(len(stages), dtype=np.int64)
-    for m in range(stages.n):
-        sure = (peak[m] < WELL * top[m]) & _alone_or_low(stages, response, m, peak[m])
+    size = np.abs(response.phasor.T) * scaled.length
+    mean = np.abs(response.mean.T) * scaled.length
+    peak = _peaks(scaled, size + mean) + size + mean
+    top = np.sqrt(np.maximum(scaled.k, 0.0) / np.where(scaled.sign < 0, -scaled.sign, 1.0))
+    top[np.broadcast_to(scaled.sign >= 0, top.shape)] = 1.0
+    depth = np.zeros(len(scaled), dtype=np.int64)
+    for m in range(scaled.n):
+        sure = (peak[m] < WELL * top[m]) & _alone_or_low(scaled, response, m, peak[m])
         depth[~sure] = m + 1
     return depth
 
@@ -87,73 +87,73 @@ def _followed(chain: Chain, setting: Setting, count: int, phasor: NDArray[np.com
     return settled
 
 
-def _contracting(stages: Stages, response: Response) -> Bools:
+def _contracting(scaled: ScaledChain, response: Response) -> Bools:
     """Whether every motion from rest ends in one orbit, the one of `response`; bool, shape (N,).
 
     With g the largest response of |z| to any force of size 1 without the cubic term, |z| <= R with R = g F + g R^3, and
     two motions within R approach each other while 3 g R^2 < 1.
     """
-    sums = _forward_gains(stages) if not stages.joint else _joint_gains(stages)
-    load = np.abs(stages.force)
-    load[0] += np.abs(stages.drive)
+    sums = _forward_gains(scaled) if not scaled.joint else _joint_gains(scaled)
+    load = np.abs(scaled.force)
+    load[0] += np.abs(scaled.drive)
     first, gain = (sums * load[None]).sum(axis=1).max(axis=0), sums.sum(axis=1).max(axis=0)
     radius = first
     for _ in range(60):
         radius = first + gain * radius**3
-    size = (np.abs(response.harmonics).sum(axis=1) + np.abs(response.mean)).max(axis=1) * stages.length
+    size = (np.abs(response.harmonics).sum(axis=1) + np.abs(response.mean)).max(axis=1) * scaled.length
     calm: Bools = (3 * gain * radius**2 < 1) & (size <= 1.001 * radius)
     return calm
 
 
-def _joint_gains(stages: Stages) -> Floats:
+def _joint_gains(scaled: ScaledChain) -> Floats:
     """Bounds of the integrals of |z_m| after an impulse on oscillator j; float64, shape (n, n, N), inf if unknown."""
-    n, size = stages.n, len(stages)
+    n, size = scaled.n, len(scaled)
     if n > MOST_JOINT:
         return np.full((n, n, size), np.inf)
-    exponents, modes = np.linalg.eig(rest_matrix(stages))
-    decay = -exponents.real * stages.omega[:, None]
-    weights = np.abs(np.linalg.pinv(modes))[:, :, n:] / (stages.omega[:, None, None] * decay[:, :, None])
+    exponents, modes = np.linalg.eig(rest_matrix(scaled))
+    decay = -exponents.real * scaled.omega[:, None]
+    weights = np.abs(np.linalg.pinv(modes))[:, :, n:] / (scaled.omega[:, None, None] * decay[:, :, None])
     gains = np.abs(modes[:, :n]) @ np.where(decay[:, :, None] > 0, weights, np.inf)
     # A nearly defective matrix makes the sum over its modes worthless, which its size shows.
     bounds: Floats = np.nan_to_num(gains, nan=np.inf).transpose(1, 2, 0)
     return bounds
 
 
-def _forward_gains(stages: Stages) -> Floats:
+def _forward_gains(scaled: ScaledChain) -> Floats:
     """The same where each oscillator is fed by those before it only: the integrals multiply along the way."""
-    n, size = stages.n, len(stages)
+    n, size = scaled.n, len(scaled)
     if n > MOST_JOINT:
         return np.full((n, n, size), np.inf)
-    own = stages.k - 0.25 * stages.delta**2
-    swing = np.where(own > 0, 1 / np.tanh(np.pi * stages.delta / (4 * np.sqrt(own))), 1.0) / stages.k
+    own = scaled.k - 0.25 * scaled.delta**2
+    swing = np.where(own > 0, 1 / np.tanh(np.pi * scaled.delta / (4 * np.sqrt(own))), 1.0) / scaled.k
     gains = np.zeros((n, n, size))
     for m in range(n):
         gains[m, m] = 1.0
-        for source, link in stages.inputs(m):
+        for source, link in scaled.inputs(m):
             gains[m] += np.abs(link) * gains[source]
         gains[m] *= swing[m]
     return np.nan_to_num(gains, nan=np.inf)
 
 
-def _peaks(stages: Stages, size: Floats) -> Floats:
+def _peaks(scaled: ScaledChain, size: Floats) -> Floats:
     """Bound of each oscillator's transient part; float64, shape (n, N).
 
     The transient of oscillator m is -z_m(0) ringing at its own frequency nu_m, plus its answer to the transient of
     m - 1. In resonance a source t^j e^{-delta t/2} becomes lam/(2 nu (j+1)) t^{j+1} e^{-delta t/2}, off resonance
     by D it is multiplied by lam/(nu D). The peak of t^j e^{-delta t/2} is (2 j/(delta e))^j.
     """
-    nu = np.sqrt(np.maximum(stages.k - 0.25 * stages.delta**2, 1e-3 * np.abs(stages.k)))
+    nu = np.sqrt(np.maximum(scaled.k - 0.25 * scaled.delta**2, 1e-3 * np.abs(scaled.k)))
     # The slowest decay of any oscillator bounds them all.
-    delta = stages.delta.min()
+    delta = scaled.delta.min()
     terms: list[Floats] = []
     peaks = np.empty_like(size)
-    for m in range(stages.n):
-        own = size[m] * np.maximum(1.0, stages.omega / nu[m])
+    for m in range(scaled.n):
+        own = size[m] * np.maximum(1.0, scaled.omega / nu[m])
         if m:
             apart = np.abs(nu[:m] - nu[m]).min(axis=0)
             resonant = apart <= delta
-            climb = np.where(resonant, stages.lam[m] / (2 * nu[m]), 0.0)
-            pass_on = np.where(resonant, 0.0, stages.lam[m] / (nu[m] * apart))
+            climb = np.where(resonant, scaled.lam[m] / (2 * nu[m]), 0.0)
+            pass_on = np.where(resonant, 0.0, scaled.lam[m] / (nu[m] * apart))
             grown = [climb * term / (j + 1) for j, term in enumerate(terms)]
             kept = [pass_on * term for term in terms]
             terms = [own + kept[0], *(a + b for a, b in zip(kept[1:], grown, strict=False)), grown[-1]]
@@ -165,17 +165,17 @@ def _peaks(stages: Stages, size: Floats) -> Floats:
     return peaks
 
 
-def _alone_or_low(stages: Stages, response: Response, m: int, peak: Floats) -> Bools:
+def _alone_or_low(scaled: ScaledChain, response: Response, m: int, peak: Floats) -> Bools:
     """Oscillator m has one answer under its input, or its transient stays far below the fold of the lower one."""
-    force = stages.drive if m == 0 else stages.lam[m] * response.phasor[:, m - 1] * stages.length
-    osc = oscillator(stages, m)
+    force = scaled.drive if m == 0 else scaled.lam[m] * response.phasor[:, m - 1] * scaled.length
+    osc = oscillator(scaled, m)
     cubic = cubic_of(osc, force)
-    if not stages.has_mean:
+    if not scaled.has_mean:
         below, above = cubic.c <= NEAR * cubic.value(cubic.peak), cubic.c * NEAR >= cubic.value(cubic.dip)
         several = cubic.folded & below & above
     else:
         # A mean tilts the cubic: wherever it could bend the wrong way, ask for the margin below.
         several = -cubic.sign * cubic.kappa + 3 * cubic.strength * peak**2 > np.sqrt(3) * cubic.g
-    several &= np.abs(stages.drive) > 0
+    several &= np.abs(scaled.drive) > 0
     fold = np.where(cubic.folded, cubic.peak, 0.0)
     return ~several | (0.75 * cubic.strength * peak**2 < FOLD**2 * fold)

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.chain import Closure
 from ..model.device import Device
 from .integrate import GridIntegrator
 
@@ -56,6 +55,6 @@ class AsBuilt:
             delta=self.delta,
             beta=self.beta,
             stiffness=self.stiffness,
-            ring=device.coupling.closure is Closure.RING,
+            ring=device.chain.law.closed,
             dtau=device.tau_per_s / rate_hz,
         )

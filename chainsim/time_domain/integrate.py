@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..equations.coupling import CouplingLaw, law_of
 from ..errors import ChainError
-from ..model.chain import CouplingKind
+from ..threads import in_threads
 from .grid_kernels import WIDTH, Actuators, Chains, Stretch, advance_chains, advance_unequal
 from .linked_kernels import Samples, Wiring, advance_linked
-from .scaled import in_threads
 
 __all__ = ["Escape", "GridError", "GridIntegrator"]
 
@@ -75,15 +75,15 @@ class GridIntegrator:
         stiffness: ArrayLike = 1.0,
         both_ways: bool = False,
         down: bool = False,
-        kind: CouplingKind | str = CouplingKind.RESISTOR,
+        kind: str = "resistor",
     ) -> None:
         if min(shape) < 1 or chain_length < 1 or shape[1] % chain_length:
             raise GridError(f"chain_length: expected a divisor of the {shape[1]} columns, got {chain_length}")
         if not (math.isfinite(dtau) and dtau > 0):
             raise GridError(f"dtau: expected a finite number > 0, got {dtau}")
         self._shape, self._length = (int(shape[0]), int(shape[1])), int(chain_length)
-        self._down, self._both_ways = down, both_ways
-        self._wiring = _wiring(self._shape[0], self._length, ring, both_ways, down, CouplingKind(kind))
+        self._down = down
+        self._law = _law(self._length, ring, both_ways, down, kind)
         rows = shape[0] if down else 1
         chains, n = shape[0] * shape[1] // (rows * chain_length), rows * chain_length
         self._state = np.zeros((5, chains, n))
@@ -91,6 +91,7 @@ class GridIntegrator:
         if each.delta.min() < 0:
             raise GridError(f"delta: expected numbers >= 0, got {each.delta.min()}")
         unequal = bool(np.ptp(each.delta) or np.ptp(each.beta) or (each.stiffness != 1.0).any())
+        self._wiring = None if self._law.plain else Wiring(*self._law.sources(n), self._law.back)
         self._each = each if unequal or self._wiring else None
         softest = each.beta[each.beta < 0].max(initial=-np.inf)
         limit = 50 / math.sqrt(-softest) if np.isfinite(softest) else 1e9
@@ -194,9 +195,8 @@ class GridIntegrator:
             return downs
         if lam_y is not None:
             raise GridError("lam_y: this grid has no links downwards; leave it out")
-        return (
-            np.append(links[:, :, 1:], links[:, :, :1], axis=2) if self._both_ways else np.zeros((1, *links.shape[1:]))
-        )
+        other = self._law.second(links, None)
+        return np.zeros((1, *links.shape[1:])) if other is None else other
 
     def _chains(self, name: str, values: Floats, shape: tuple[int, ...]) -> Floats:
         array = np.ascontiguousarray(values, dtype=np.float64)
@@ -220,17 +220,13 @@ class GridIntegrator:
         return np.ascontiguousarray(z).reshape(len(z), *self._shape)
 
 
-def _wiring(rows: int, length: int, ring: bool, both_ways: bool, down: bool, kind: CouplingKind) -> Wiring | None:
-    """Who feeds whom; None for what `grid_kernels` knows: one way along a chain or ring of resistors."""
+def _law(length: int, ring: bool, both_ways: bool, down: bool, kind: str) -> CouplingLaw:
+    """Who feeds whom in each chain, or in the one grid of them all."""
     if (ring or both_ways) and down:
         raise GridError("down: a 2-D grid is open and acts one way; leave ring and both_ways out")
-    if both_ways and (ring or kind is CouplingKind.AMPLIFIER):
+    law = law_of("ring" if ring else "open", kind)
+    if both_ways and not (law.plain and law.in_line):
         raise GridError("both_ways: an open chain of resistors only; leave ring and amplifiers out")
-    if not (both_ways or down) and kind is CouplingKind.RESISTOR:
-        return None
-    at = np.arange(length * rows if down else length, dtype=np.int64)
-    first = np.where(at % length, at - 1, at + length - 1 if ring else at)
-    second = np.minimum(at + 1, length - 1) if both_ways else at
-    if down:
-        second = np.where(at >= length, at - length, at)
-    return Wiring(first, second, 0.0 if kind is CouplingKind.AMPLIFIER else 1.0)
+    if both_ways:
+        return law_of("bidirectional", kind)
+    return law_of("open", kind, cols=length) if down else law

@@ -6,41 +6,18 @@ z_{m+stride}`` and every force are kicks at frozen positions.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..equations.composition import FLOWS, KICKS
+from ..equations.views import Network
 from .splitting import flow
 
-__all__ = ["Network", "advance_network", "flows_of"]
+__all__ = ["advance_network", "flows_of"]
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.int64]
-
-
-class Network(NamedTuple):
-    """N settings of n coupled oscillators, as the kernels take them.
-
-    Attributes
-    ----------
-    stiffness, lam, other, constant : float64, shape (N, n); `lam` links m - 1 into m, `other` m + stride into m.
-    drive : float64, shape (N, 2), factors of cosine and sine of the drive's phase on the first oscillator.
-    period : float64, shape (N,). delta, beta : float64, shape (n,). ring : whether the last feeds the first.
-    """
-
-    stiffness: Floats
-    lam: Floats
-    other: Floats
-    stride: int
-    constant: Floats
-    drive: Floats
-    period: Floats
-    delta: Floats
-    beta: Floats
-    ring: bool
 
 
 @compiled

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..harmonic_balance.march import classify
-from ..harmonic_balance.starts import Cubic
-from ..model.chain import Chain, Setting
+from ..equations.basis import basis_for
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
+from ..harmonic_balance.march import branches_of
 from ..model.response import Branch, Outcome, Response, Stats
-from ..rung import MAX_PERIODS, Rung, RungError, Start
-from .ode_ramp import settle_ramp
-from .scaled import Problem, scaled
+from ..rung import MAX_PERIODS, TERMS, Rung, RungError, Start
+from .ramp import settle_ramp
 from .shooting import FAR_SMALLER, Orbits, shoot
 from .transient import Settled, settle
 
@@ -58,10 +58,10 @@ def reached_from_rest(chain: Chain, setting: Setting, *, max_periods: int) -> Re
     max_periods : drive periods after which a setting is given up as out of budget.
     """
     began = time.perf_counter()
-    problem = scaled(chain, setting)
-    settled = settle(problem, max_periods)
-    stats = _stats(problem, settled, 0, time.perf_counter() - began)
-    return Reached(settled.outcome, settled.phasor / problem.scale, stats)
+    scaled = ScaledChain.of(chain, setting)
+    settled = settle(scaled, max_periods)
+    stats = _stats(scaled, settled, 0, time.perf_counter() - began)
+    return Reached(settled.outcome, settled.phasor / scaled.length, stats)
 
 
 def steady_from_rest(chain: Chain, setting: Setting, *, tol: float, max_periods: int) -> Response:
@@ -86,8 +86,8 @@ def steady_from_rest(chain: Chain, setting: Setting, *, tol: float, max_periods:
     """
     _check(tol, max_periods)
     began = time.perf_counter()
-    problem = scaled(chain, setting)
-    return _polished(problem, settle(problem, max_periods), tol, began)
+    scaled = ScaledChain.of(chain, setting)
+    return _polished(scaled, settle(scaled, max_periods), tol, began)
 
 
 def steady_from_ramp(chain: Chain, setting: Setting, *, tol: float, max_periods: int) -> Response:
@@ -97,7 +97,7 @@ def steady_from_ramp(chain: Chain, setting: Setting, *, tol: float, max_periods:
     """
     _check(tol, max_periods)
     began = time.perf_counter()
-    return _polished(scaled(chain, setting), settle_ramp(chain, setting, max_periods=max_periods), tol, began)
+    return _polished(ScaledChain.of(chain, setting), settle_ramp(chain, setting, max_periods=max_periods), tol, began)
 
 
 def _check(tol: float, max_periods: int) -> None:
@@ -107,8 +107,8 @@ def _check(tol: float, max_periods: int) -> None:
         raise RungError(f"max_periods: expected 1 or more, got {max_periods}")
 
 
-def _polished(problem: Problem, settled: Settled, tol: float, began: float) -> Response:
-    polished = _Polished(problem, settled)
+def _polished(scaled: ScaledChain, settled: Settled, tol: float, began: float) -> Response:
+    polished = _Polished(scaled, settled)
     polished.refine(tol)
     return polished.response(tol, began)
 
@@ -116,9 +116,9 @@ def _polished(problem: Problem, settled: Settled, tol: float, began: float) -> R
 class _Polished:
     """Orbits of all N settings, refined by doubling the steps; NaN where none is known."""
 
-    def __init__(self, problem: Problem, settled: Settled) -> None:
-        size, n = len(problem), problem.n
-        self.problem, self.settled = problem, settled
+    def __init__(self, scaled: ScaledChain, settled: Settled) -> None:
+        size, n = len(scaled), scaled.n
+        self.scaled, self.settled = scaled, settled
         self.state = np.array(settled.state)
         self.harmonics = np.full((size, 8, n), np.nan, dtype=np.complex128)
         self.multipliers = np.full((size, n, 2), np.nan, dtype=np.complex128)
@@ -132,7 +132,7 @@ class _Polished:
             steps = max(4 * int(value), _FIRST_STEPS)
             lanes = self._shoot(np.flatnonzero(reached & (self.settled.steps == value)), steps)
             for _ in range(_DOUBLINGS):
-                if not len(lanes) or steps * self.problem.n > _MOST_WORK:
+                if not len(lanes) or steps * self.scaled.n > _MOST_WORK:
                     break
                 steps *= 2
                 before = self.error.copy()
@@ -142,9 +142,9 @@ class _Polished:
 
     def _shoot(self, lanes: Lanes, steps: int) -> Lanes:
         """Solve `lanes` at `steps`, note the change since the last solve; returns those that were found."""
-        orbits = shoot(self.problem, lanes, self.state[lanes], steps)
+        orbits = shoot(self.scaled, lanes, self.state[lanes], steps)
         self.turns += orbits.turns
-        self.kicks += 7 * steps * orbits.turns * (self.problem.n if self.problem.joint else 1)
+        self.kicks += 7 * steps * orbits.turns * (self.scaled.n if self.scaled.joint else 1)
         lanes, change = lanes[orbits.found], self._change(lanes, orbits)
         # Rounded flow coefficients err alike in every step, so round-off grows with the steps and with Q.
         gap = np.min(np.abs(1 - orbits.multipliers[orbits.found]), axis=2)
@@ -159,7 +159,7 @@ class _Polished:
         """Largest change of any harmonic, relative to its oscillator's largest; inf at the first solve."""
         old, new = self.harmonics[lanes[orbits.found]], orbits.harmonics[orbits.found]
         size = np.max(np.abs(new), axis=1)
-        if self.problem.joint:
+        if self.scaled.joint:
             size = np.maximum(size, FAR_SMALLER * np.max(size, axis=1, keepdims=True, initial=0.0))
         change = np.max(np.abs(new - old), axis=1)
         ratio = np.divide(change, size, out=np.zeros_like(size), where=size > 0)
@@ -175,10 +175,10 @@ class _Polished:
         # An orbit that only the coarse steps of the transient find stable is none that is reached.
         outcome[reached & ~(inside & (self.error <= max(tol, _USABLE)))] = Outcome.NO_CONVERGENCE
         ok = outcome == Outcome.OK
-        harmonics = self.harmonics / self.problem.scale
+        harmonics = self.harmonics / self.scaled.length
         harmonics[~ok] = np.nan
-        stats = _stats(self.problem, self.settled, self.turns, time.perf_counter() - began, self.kicks)
-        branch = _branches(self.problem, self.harmonics, ok)
+        stats = _stats(self.scaled, self.settled, self.turns, time.perf_counter() - began, self.kicks)
+        branch = _branches(self.scaled, self.harmonics, ok)
         answer = Response(
             rung=OdeRung.name, outcome=outcome, harmonics=harmonics[:, 1:], mean=harmonics[:, 0].real,
             stable=np.array(ok), locked=ok, multipliers=self.multipliers, branch=branch,
@@ -189,26 +189,20 @@ class _Polished:
         return answer
 
 
-def _branches(problem: Problem, harmonics: NDArray[np.complex128], ok: NDArray[np.bool_]) -> NDArray[np.int8]:
+def _branches(scaled: ScaledChain, harmonics: NDArray[np.complex128], ok: NDArray[np.bool_]) -> NDArray[np.int8]:
     """`Branch` of each oscillator under the first harmonic of what drives it; int8, shape (N, n)."""
-    branch = np.full((len(problem), problem.n), Branch.LOW, dtype=np.int8)
-    if problem.linear or not ok.any():
-        return branch
-    it = problem.network
-    omega = (2 * np.pi / it.period)[ok, None]
-    first = harmonics[ok, 1]
-    force = it.lam[ok] * np.roll(first, 1, axis=1) + it.other[ok] * np.roll(first, -it.stride, axis=1)
-    force[:, 0] += it.drive[ok, 0] - 1j * it.drive[ok, 1]
-    cubic = Cubic.of(it.stiffness[ok] - omega**2, it.delta * omega, it.beta, force)
-    branch[ok] = classify(cubic, first)
+    branch = np.full((len(scaled), scaled.n), Branch.LOW, dtype=np.int8)
+    basis, first = basis_for(1, False), harmonics[ok, 1]
+    x = np.stack([first.real.T, first.imag.T], axis=1)
+    branch[ok] = branches_of(scaled.pick(ok), basis, x).T
     return branch
 
 
-def _stats(problem: Problem, settled: Settled, turns: int, seconds: float, kicks: int = 0) -> Stats:
+def _stats(scaled: ScaledChain, settled: Settled, turns: int, seconds: float, kicks: int = 0) -> Stats:
     return Stats(
         rhs_evals=settled.kicks + kicks,
         newton_steps=settled.turns + turns,
-        oscillators_solved=len(problem) * problem.n,
+        oscillators_solved=len(scaled) * scaled.n,
         periods=settled.periods,
         seconds=seconds,
     )
@@ -220,6 +214,7 @@ class OdeRung(Rung):
     name: ClassVar[str] = "ode"
     order: ClassVar[str] = "tol (steps are doubled until the answer moves by less)"
     valid: ClassVar[str] = "always; a slow settling may exceed the budget of periods"
+    models = TERMS
 
     max_periods: ClassVar[int] = MAX_PERIODS
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..equations.composition import FLOWS, KICKS
+from ..equations.views import Network
 from ..inlined import inlined
-from .network import Network
 from .splitting import flow
 
 __all__ = ["HARMONICS", "map_joint", "shoot_forward"]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..equations.scaled_chain import ScaledChain
+from ..threads import in_threads
 from .period_map import HARMONICS, map_joint, shoot_forward
-from .scaled import Problem, in_threads
 from .splitting import forcing_table
 
 __all__ = ["FAR_SMALLER", "Orbits", "shoot"]
@@ -24,7 +25,7 @@ FAR_SMALLER = 1e-9
 
 @dataclass(frozen=True)
 class Orbits:
-    """What shooting found for L settings, in the scaled units of `Problem`.
+    """What shooting found for L settings, in the units of `ScaledChain`.
 
     Attributes
     ----------
@@ -49,13 +50,13 @@ class Orbits:
         return self.found & inside
 
 
-def shoot(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
+def shoot(scaled: ScaledChain, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
     """Solve for the periodic orbits of settings `lanes` near `guess` (shape (L, 2n)) at `steps` per period."""
-    return (_shoot_joint if problem.joint else _shoot_forward)(problem, lanes, guess, steps)
+    return (_shoot_joint if scaled.joint else _shoot_forward)(scaled, lanes, guess, steps)
 
 
-def _shoot_forward(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
-    count, n, table = len(lanes), problem.n, forcing_table(steps)
+def _shoot_forward(scaled: ScaledChain, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
+    count, n, table = len(lanes), scaled.n, forcing_table(steps)
     state = np.array(guess)
     harmonics = np.full((count, HARMONICS + 1, n), np.nan, dtype=np.complex128)
     tangent = np.full((count, n, 2, 2), np.nan)
@@ -63,7 +64,7 @@ def _shoot_forward(problem: Problem, lanes: Lanes, guess: Floats, steps: int) ->
 
     def work(part: slice) -> None:
         shoot_forward(
-            state[part], lanes[part], problem.network, table,
+            state[part], lanes[part], scaled.network, table,
             harmonics[part], tangent[part], defect[part], turns[part],
         )  # fmt: skip
 
@@ -83,8 +84,8 @@ def _block_multipliers(tangent: Floats) -> NDArray[np.complex128]:
     return np.stack([half + root, half - root], axis=-1)
 
 
-def _shoot_joint(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
-    count, n, table = len(lanes), problem.n, forcing_table(steps)
+def _shoot_joint(scaled: ScaledChain, lanes: Lanes, guess: Floats, steps: int) -> Orbits:
+    count, n, table = len(lanes), scaled.n, forcing_table(steps)
     state, end, high = np.array(guess), np.empty((count, 2 * n)), np.empty((count, n))
     tangent, defect = np.empty((count, 2 * n, 2 * n)), np.full(count, np.nan)
     harmonics = np.full((count, HARMONICS + 1, n), np.nan, dtype=np.complex128)
@@ -94,7 +95,7 @@ def _shoot_joint(problem: Problem, lanes: Lanes, guess: Floats, steps: int) -> O
         mine = live[part]
         found = np.empty((len(mine), 2 * n)), np.empty((len(mine), 2 * n, 2 * n)), np.empty((len(mine), n))
         waves = np.empty((len(mine), HARMONICS + 1, n), dtype=np.complex128)
-        map_joint(state[mine], lanes[mine], problem.network, table, *found, waves)
+        map_joint(state[mine], lanes[mine], scaled.network, table, *found, waves)
         end[mine], tangent[mine], high[mine] = found
         harmonics[mine] = waves
 

@@ -14,16 +14,16 @@ instructions, and p's shears keep the determinant whatever is rounded.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..equations.composition import FLOWS, KICK_TIMES, KICKS
+from ..equations.views import PlainNetwork
 from ..inlined import inlined
 
-__all__ = ["WIDTH", "System", "advance_block", "flow", "forcing_table"]
+__all__ = ["WIDTH", "advance_block", "flow", "forcing_table"]
 
 Floats = NDArray[np.float64]
 
@@ -44,25 +44,6 @@ _LINK, _PULL, _CONSTANT, _BY_P, _BY_Q, _PENDING, _ROW = (_LANES * row for row in
 _FIRST = float(FLOWS[0])
 _DISTINCT = np.append(FLOWS[1:4], 2 * _FIRST)
 _B0, _B1, _B2, _B3 = (float(weight) for weight in KICKS[:4])
-
-
-class System(NamedTuple):
-    """N settings of one chain, as the kernels take them.
-
-    Attributes
-    ----------
-    lam : float64, shape (N, n). constant : float64, shape (N, n), forces that do not change.
-    drive : float64, shape (N, 2), factors of cosine and sine of the drive's phase on the first oscillator.
-    period : float64, shape (N,). delta, beta : of the chain. ring : whether its ends are joined.
-    """
-
-    lam: Floats
-    constant: Floats
-    drive: Floats
-    period: Floats
-    delta: float
-    beta: float
-    ring: bool
 
 
 def forcing_table(steps: int) -> Floats:
@@ -273,7 +254,9 @@ def _raise_peak(rows: Floats, h: Floats, peak: Floats) -> None:
 
 
 @inlined
-def _run(shared: Floats, rows: Floats, system: System, table: Floats, first: int, count: int, peak: Floats) -> None:
+def _run(
+    shared: Floats, rows: Floats, system: PlainNetwork, table: Floats, first: int, count: int, peak: Floats
+) -> None:
     """Advance one block by `count` steps from step `first` of the period; `peak` collects max z^2 + p^2."""
     h = shared[_STEP : _STEP + _LANES]
     _share(shared, system.delta, system.beta)
@@ -303,7 +286,7 @@ def _run(shared: Floats, rows: Floats, system: System, table: Floats, first: int
 
 @compiled
 def advance_block(
-    state: Floats, lanes: NDArray[np.int64], system: System, table: Floats, first: int, count: int, peak: Floats
+    state: Floats, lanes: NDArray[np.int64], system: PlainNetwork, table: Floats, first: int, count: int, peak: Floats
 ) -> None:
     """Advance the settings `lanes` by `count` steps from step `first` of the drive period, in place.
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome
+from ..threads import in_threads
 from .network import advance_network
-from .scaled import Problem, in_threads
 from .shooting import FAR_SMALLER, shoot
 from .splitting import WIDTH, advance_block, forcing_table
+from .stepping import coarse_steps, escape_amplitude, steps_at
 
 __all__ = ["Settled", "settle"]
 
@@ -32,7 +34,7 @@ _MOST_STEPS = 8192  # Steps per period beyond which a setting counts as out of b
 
 @dataclass(frozen=True)
 class Settled:
-    """The verdict for N settings, in the scaled units of `Problem`.
+    """The verdict for N settings, in the units of `ScaledChain`.
 
     Attributes
     ----------
@@ -51,20 +53,20 @@ class Settled:
     kicks: int
 
 
-def settle(problem: Problem, max_periods: int) -> Settled:
+def settle(scaled: ScaledChain, max_periods: int) -> Settled:
     """Integrate every setting from rest until its outcome is sure, for at most `max_periods` periods each.
 
     A linear chain needs no integration: its only orbit attracts everything or nothing. Settings whose motion
     is strongly nonlinear are decided again with four times the steps that their swings at that amplitude need.
     """
-    run = _Run(problem, max_periods)
-    steps = problem.coarse_steps
+    run = _Run(scaled, max_periods)
+    steps = coarse_steps(scaled)
     for value in np.unique(steps[steps <= _MOST_STEPS]):
-        decide = run.decide_linear if problem.linear else run.decide
+        decide = run.decide_linear if scaled.linear else run.decide
         decide(np.flatnonzero(steps == value), int(value))
-    if not problem.linear:
+    if not scaled.linear:
         strong = ~(run.peak <= _STRONG) & (steps <= _MOST_STEPS)
-        again = np.minimum(4 * problem.steps_at(run.peak), _MOST_STEPS)
+        again = np.minimum(4 * steps_at(scaled, run.peak), _MOST_STEPS)
         for value in np.unique(again[strong]):
             run.decide(np.flatnonzero(strong & (again == value)), int(value))
     return Settled(run.outcome, run.steps, run.state, run.phasor, run.periods, run.turns, run.kicks)
@@ -73,12 +75,12 @@ def settle(problem: Problem, max_periods: int) -> Settled:
 class _Run:
     """The arrays of one call of `settle`; every field has the leading axis N."""
 
-    def __init__(self, problem: Problem, max_periods: int) -> None:
-        size, n = len(problem), problem.n
-        self.problem, self.max_periods = problem, max_periods
+    def __init__(self, scaled: ScaledChain, max_periods: int) -> None:
+        size, n = len(scaled), scaled.n
+        self.scaled, self.max_periods = scaled, max_periods
         self.outcome = np.empty(size, dtype=object)
         self.outcome.fill(Outcome.OUT_OF_BUDGET)
-        self.steps = np.array(problem.coarse_steps)
+        self.steps = np.array(coarse_steps(scaled))
         self.state, self.peak = np.zeros((size, 2 * n)), np.zeros(size)
         self.phasor = np.full((size, n), np.nan, dtype=np.complex128)
         self.orbit, self.distance = np.full((size, 2 * n), np.nan), np.full(size, np.inf)
@@ -89,14 +91,14 @@ class _Run:
         self.outcome[lanes], self.steps[lanes] = Outcome.OUT_OF_BUDGET, steps
         self.state[lanes], self.peak[lanes] = 0.0, 0.0
         self.orbit[lanes], self.distance[lanes], self.phasor[lanes] = np.nan, np.inf, np.nan
-        rate = 0.5 * float(np.min(self.problem.network.delta)) * float(np.min(self.problem.period[lanes]))
+        rate = 0.5 * float(np.min(self.scaled.network.delta)) * float(np.min(self.scaled.network.period[lanes]))
         pace = int(np.clip(1.0 / rate if rate > 0 else np.inf, 4, max(self.max_periods // 16, 4)))
         # Transients of n stages in cascade die like t^(n-1) e^(-rate t). Fed forward, beats that stay are rare,
         # and what looks like one may be a slow passage by the ghost of a fold: that is given three times as long.
-        folds = (20 + 4 * self.problem.n) * (1 if self.problem.joint else 3)
+        folds = (20 + 4 * self.scaled.n) * (1 if self.scaled.joint else 3)
         patience = folds / rate if rate > 0 else np.inf
-        table, history, done = forcing_table(steps), _History(self.problem), 0
-        most = min(self.max_periods, max(1, _MOST_KICKS // (7 * steps * self.problem.n)))
+        table, history, done = forcing_table(steps), _History(self.scaled), 0
+        most = min(self.max_periods, max(1, _MOST_KICKS // (7 * steps * self.scaled.n)))
         while len(lanes) and done < most:
             go = min(max(pace, int(0.15 * done)), most - done)
             changes = self._advance(lanes, table, go)
@@ -106,9 +108,9 @@ class _Run:
 
     def decide_linear(self, lanes: Lanes, steps: int) -> None:
         """The outcome of linear settings from their one orbit; a marginal one (no damping) stays undecided."""
-        orbits = shoot(self.problem, lanes, np.zeros((len(lanes), 2 * self.problem.n)), steps)
+        orbits = shoot(self.scaled, lanes, np.zeros((len(lanes), 2 * self.scaled.n)), steps)
         self.turns += orbits.turns
-        inside = np.max(np.abs(orbits.state), axis=1) <= self.problem.escape
+        inside = np.max(np.abs(orbits.state), axis=1) <= escape_amplitude(self.scaled)
         reached = orbits.stable & inside
         self._accept(lanes[reached], orbits.state[reached], orbits.harmonics[reached, 1])
         grows = np.max(np.abs(orbits.multipliers), axis=(1, 2)) > 1 + _SAME
@@ -119,35 +121,35 @@ class _Run:
 
     def _advance(self, lanes: Lanes, table: Floats, periods: int) -> Floats:
         """Advance by whole periods; each oscillator's relative change over the last one, shape (L, n)."""
-        problem, steps = self.problem, len(table)
+        scaled, steps = self.scaled, len(table)
 
         def move(count: int) -> None:
             def work(part: slice) -> None:
-                if problem.plain:
-                    advance_block(self.state, lanes[part], problem.system, table, 0, count * steps, self.peak)
+                if scaled.plain:
+                    advance_block(self.state, lanes[part], scaled.network.plain, table, 0, count * steps, self.peak)
                 else:
-                    advance_network(self.state, lanes[part], problem.network, table, 0, count * steps, self.peak)
+                    advance_network(self.state, lanes[part], scaled.network, table, 0, count * steps, self.peak)
 
-            in_threads(work, len(lanes), WIDTH if problem.plain else 1)
+            in_threads(work, len(lanes), WIDTH if scaled.plain else 1)
 
         move(periods - 1)
         before = self.state[lanes]
         move(1)
         self.periods += periods * len(lanes)
-        self.kicks += 7 * steps * periods * len(lanes) * problem.n
-        return _distances(before, self.state[lanes], joint=problem.joint)
+        self.kicks += 7 * steps * periods * len(lanes) * scaled.n
+        return _distances(before, self.state[lanes], joint=scaled.joint)
 
     def _look(self, lanes: Lanes, steps: int, history: _History, patient: bool) -> Lanes:
         """Settle what can be settled now; returns the settings that go on."""
-        escaped = ~(np.sqrt(self.peak[lanes]) <= self.problem.escape)
+        escaped = ~(np.sqrt(self.peak[lanes]) <= escape_amplitude(self.scaled))
         # What cannot run away has outrun the steps.
-        self.outcome[lanes[escaped]] = Outcome.NO_CONVERGENCE if self.problem.bounded else Outcome.ESCAPED
+        self.outcome[lanes[escaped]] = Outcome.NO_CONVERGENCE if self.scaled.hardens else Outcome.ESCAPED
         lanes = lanes[~escaped]
         quiet = np.full_like(lanes, True, dtype=np.bool_) if patient else history.change(lanes) < _QUIET
         restless, lanes = lanes[~quiet], lanes[quiet]
-        orbits = shoot(self.problem, lanes, self.state[lanes], steps)
+        orbits = shoot(self.scaled, lanes, self.state[lanes], steps)
         self.turns += orbits.turns
-        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.problem.joint))
+        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.scaled.joint))
         distance = np.where(orbits.stable, away, np.inf)
         same = _worst(_distances(self.orbit[lanes], orbits.state)) < _SAME
         nearing = same & (distance < np.maximum(_SHRINKS * self.distance[lanes], _SAME))
@@ -162,8 +164,8 @@ class _Run:
 class _History:
     """What every look saw, to tell recurrent motion from decay."""
 
-    def __init__(self, problem: Problem) -> None:
-        self._joint, self._shape = problem.joint, (len(problem), problem.n)
+    def __init__(self, scaled: ScaledChain) -> None:
+        self._joint, self._shape = scaled.joint, (len(scaled), scaled.n)
         self._looks: list[tuple[int, Floats]] = []
 
     def add(self, done: int, lanes: Lanes, changes: Floats) -> None:

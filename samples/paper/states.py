@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from chainsim.continuation.continuation import continue_branch
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Setting, balance_near, solve
 from chainsim.averaging.envelope import follow
-from chainsim.continuation.continuation import continue_branch
 from chainsim.continuation.locking import locking
 from chainsim.continuation.spectrum import delta_from_critical_lam
 

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..averaging.flow import SlowFlow
-from ..model.chain import Chain, Setting
+from ..equations.chain import Chain, Setting
+from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome
+from ..threads import in_threads
 from .network import advance_network
-from .scaled import Problem, in_threads, scaled
 from .shooting import shoot
 from .splitting import forcing_table
+from .stepping import coarse_steps, escape_amplitude
 from .transient import Settled
 
 __all__ = ["RAMP", "settle_ramp"]
@@ -31,9 +33,9 @@ def settle_ramp(chain: Chain, setting: Setting, *, max_periods: int) -> Settled:
 
     Outcomes are those of `settle`, but a motion that does not lock is out of budget after `max_periods` periods.
     """
-    problem = scaled(chain, setting)
-    run = _Run(problem, _equilibrium(chain, setting) * problem.scale)
-    steps = STEPS * problem.coarse_steps
+    scaled = ScaledChain.of(chain, setting)
+    run = _Run(scaled, _equilibrium(chain, setting) * scaled.length)
+    steps = STEPS * coarse_steps(scaled)
     for value in np.unique(steps):
         run.decide(np.flatnonzero(steps == value), int(value), max_periods)
     return Settled(run.outcome, steps, run.state, run.phasor, run.periods, run.turns, run.kicks)
@@ -49,14 +51,14 @@ def _equilibrium(chain: Chain, setting: Setting) -> Floats:
 class _Run:
     """The arrays of one call; every field has the leading axis N."""
 
-    def __init__(self, problem: Problem, place: Floats) -> None:
-        size, n = len(problem), problem.n
-        self.problem = problem
+    def __init__(self, scaled: ScaledChain, place: Floats) -> None:
+        size, n = len(scaled), scaled.n
+        self.scaled = scaled
         self.outcome = np.empty(size, dtype=object)
         self.outcome.fill(Outcome.OUT_OF_BUDGET)
         self.outcome[~np.isfinite(place).all(axis=1)] = Outcome.ESCAPED
         # All z, then all p = z' + delta/2 z.
-        self.state = np.concatenate([place, 0.5 * problem.network.delta * place], axis=1)
+        self.state = np.concatenate([place, 0.5 * scaled.network.delta * place], axis=1)
         self.peak = np.zeros(size)
         self.phasor = np.full((size, n), np.nan, dtype=np.complex128)
         self.periods = self.turns = self.kicks = 0
@@ -64,8 +66,8 @@ class _Run:
     def decide(self, lanes: Lanes, steps: int, max_periods: int) -> None:
         """Ramp `lanes` at `steps` per period, then look until each has its outcome."""
         lanes = lanes[np.isfinite(self.state[lanes]).all(axis=1)]
-        delta = float(self.problem.network.delta.min())
-        longest = float(np.max(1 / (delta * self.problem.period[lanes]))) if delta > 0 and len(lanes) else np.inf
+        delta = float(self.scaled.network.delta.min())
+        longest = float(np.max(1 / (delta * self.scaled.network.period[lanes]))) if delta > 0 and len(lanes) else np.inf
         if RAMP * longest > max_periods:
             return
         table, count = forcing_table(steps), int(np.ceil(RAMP * longest))
@@ -76,10 +78,10 @@ class _Run:
         while len(lanes) and done < max_periods:
             self._advance(lanes, table, pace, 1.0)
             done += pace
-            gone = ~(np.sqrt(self.peak[lanes]) <= self.problem.escape)
-            self.outcome[lanes[gone]] = Outcome.NO_CONVERGENCE if self.problem.bounded else Outcome.ESCAPED
+            gone = ~(np.sqrt(self.peak[lanes]) <= escape_amplitude(self.scaled))
+            self.outcome[lanes[gone]] = Outcome.NO_CONVERGENCE if self.scaled.hardens else Outcome.ESCAPED
             lanes = lanes[~gone]
-            orbits = shoot(self.problem, lanes, self.state[lanes], steps)
+            orbits = shoot(self.scaled, lanes, self.state[lanes], steps)
             self.turns += orbits.turns
             near = _apart(self.state[lanes], orbits.state) < NEAR
             near &= orbits.stable & (_apart(last[lanes], orbits.state) < NEAR)
@@ -90,14 +92,14 @@ class _Run:
 
     def _advance(self, lanes: Lanes, table: Floats, periods: int, share: float) -> None:
         """Advance by whole periods under the part `share` of the drive."""
-        network = self.problem.network._replace(drive=share * self.problem.network.drive)
+        network = self.scaled.network._replace(drive=share * self.scaled.network.drive)
 
         def work(part: slice) -> None:
             advance_network(self.state, lanes[part], network, table, 0, periods * len(table), self.peak)
 
         in_threads(work, len(lanes), 1)
         self.periods += periods * len(lanes)
-        self.kicks += 7 * len(table) * periods * len(lanes) * self.problem.n
+        self.kicks += 7 * len(table) * periods * len(lanes) * self.scaled.n
 
 
 def _apart(a: Floats, b: Floats) -> Floats:

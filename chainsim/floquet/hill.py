@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import Basis
-from ..equations.scaling import Stages
+from ..equations.scaled_chain import ScaledChain
 
 __all__ = ["chain_multipliers"]
 
@@ -54,7 +54,7 @@ class _Hill:
         return _Hill(self.basis, self.span, self.base[index], self.sign[index], self.omega[index], self.x[:, index])
 
 
-def chain_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
+def chain_multipliers(scaled: ScaledChain, basis: Basis, x: Floats) -> Complexes:
     """The two multipliers of every 2 x 2 block.
 
     Parameters
@@ -65,13 +65,13 @@ def chain_multipliers(stages: Stages, basis: Basis, x: Floats) -> Complexes:
     -------
     complex128, shape (N, n, 2), each pair with product exp(-delta T); NaN where they could not be resolved.
     """
-    n, size = stages.n, len(stages)
+    n, size = scaled.n, len(scaled)
     flat = np.ascontiguousarray(x.transpose(1, 0, 2)).reshape(basis.size, -1)
-    omega = np.broadcast_to(stages.omega, (n, size)).reshape(-1)
-    base = (stages.k - 0.25 * stages.delta**2).reshape(-1)
+    omega = np.broadcast_to(scaled.omega, (n, size)).reshape(-1)
+    base = (scaled.k - 0.25 * scaled.delta**2).reshape(-1)
     # An odd series has z^2 of half the period: the monodromy is the square of that of half a turn.
     halves = 1 if basis.mean else 2
-    delta, sign = (np.repeat(stages.of_each(value), size) for value in (stages.delta, stages.sign))
+    delta, sign = (np.repeat(scaled.of_each(value), size) for value in (scaled.delta, scaled.sign))
     hill = _Hill(basis, 2 * np.pi / halves, base, sign, omega, flat)
     half_trace, slow = _half_trace(hill)
     pair = _pair(half_trace) ** halves

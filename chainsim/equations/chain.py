@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Chain", "Closure", "CouplingKind", "Setting", "Spread"]
+from .coupling import Closure, CouplingKind, CouplingLaw, law_of
+
+__all__ = ["Chain", "Setting", "Spread"]
 
 Floats = NDArray[np.float64]
-
-
-class Closure(StrEnum):
-    """How the end of a chain meets its beginning, and whether a link acts both ways."""
-
-    OPEN = "open"
-    RING = "ring"
-    BIDIRECTIONAL = "bidirectional"
-
-
-class CouplingKind(StrEnum):
-    """What a link does to the oscillator it feeds: ``lam (z_{m-1} - z_m)`` or, without a back term, ``lam z_{m-1}``."""
-
-    RESISTOR = "resistor"
-    AMPLIFIER = "amplifier"
 
 
 @dataclass(frozen=True)
@@ -56,9 +42,15 @@ class Chain:
     n : number of oscillators, 1 or more.
     delta : damping, >= 0 (Q = 1/delta).
     beta : cubic term; below 0 softens.
-    closure : open, ring or bidirectional. rows : rows of a grid, which divide n. kind : of every link.
+    closure : open, ring or bidirectional.
+    rows : rows of a grid, which divide n.
+    kind : of every link.
     spread : what differs from oscillator to oscillator; `delta` and `beta` are then one number for them all.
         `Chain.of` makes it from lists.
+
+    Attributes
+    ----------
+    law : who feeds whom and what a link does, as `closure`, `rows` and `kind` say.
 
     Raises
     ------
@@ -73,6 +65,7 @@ class Chain:
     rows: int = 1
     kind: CouplingKind = CouplingKind.RESISTOR
     spread: Spread | None = None
+    law: CouplingLaw = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.n < 1:
@@ -81,10 +74,7 @@ class Chain:
         object.__setattr__(self, "kind", CouplingKind(self.kind))
         if self.rows < 1 or self.n % self.rows:
             raise ValueError(f"chain.rows: expected a divisor of n = {self.n}, got {self.rows}")
-        if self.rows > 1 and self.closure is not Closure.OPEN:
-            raise ValueError(f"chain.closure: a grid is open, got {self.closure}")
-        if self.closure is Closure.BIDIRECTIONAL and self.kind is CouplingKind.AMPLIFIER:
-            raise ValueError("chain.kind: an amplifier acts one way; use closure open or ring")
+        object.__setattr__(self, "law", law_of(self.closure, self.kind, cols=self.cols if self.rows > 1 else None))
         _in_range("delta", self.deltas, lowest=0.0)
         _in_range("beta", self.betas)
         _in_range("stiffness", self.stiffness)
@@ -139,13 +129,12 @@ class Chain:
     @property
     def feed_forward(self) -> bool:
         """Whether no oscillator acts on one before it, so that they can be solved in turn."""
-        return self.closure is Closure.OPEN
+        return self.law.feed_forward
 
     @property
     def plain(self) -> bool:
         """Whether it is one open chain or ring of equal oscillators over resistors."""
-        alike = self.spread is None and self.kind is CouplingKind.RESISTOR
-        return alike and self.rows == 1 and self.closure is not Closure.BIDIRECTIONAL
+        return self.spread is None and self.law.plain
 
 
 def _each(name: str, value: ArrayLike, n: int) -> tuple[float, ...]:
@@ -267,13 +256,12 @@ def _checked(name: str, value: ArrayLike) -> Floats:
 def _links(chain: Chain, lam: Floats) -> Floats:
     if chain.rows > 1:
         return _in_grid("lam", lam, chain, (chain.rows, chain.cols - 1))
-    ring = chain.closure is Closure.RING
-    wanted = chain.n if ring else chain.n - 1
+    wanted = chain.law.count(chain.n)
     if lam.ndim == 0 or lam.shape[-1] == 1:
         lam = np.broadcast_to(lam, (*lam.shape[:-1], wanted))
     if lam.shape[-1] != wanted:
         raise ValueError(f"setting.lam: expected 1 or {wanted} numbers, got {lam.shape[-1]}")
-    if ring:
+    if chain.law.closed:
         return lam
     return np.concatenate([np.zeros((*lam.shape[:-1], 1)), lam], axis=-1)
 

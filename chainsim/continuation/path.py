@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..equations.basis import basis_for
+from ..equations.chain import Chain, Setting
 from ..errors import ChainError
-from ..model.chain import Chain, Setting
 from .system import BalanceSystem, Parameter
 
 __all__ = ["ContinuationError", "Ending", "Fold", "Path", "continue_branch"]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..averaging.decide import SAME, decide
+from ..equations.chain import Chain, Setting
 from ..harmonic_balance.answer import stitch
-from ..harmonic_balance.harmonic_balance import balance_near
-from ..model.chain import Chain, Setting
+from ..harmonic_balance.rung import balance_near
 from ..model.response import Outcome, Response, Stats
 from ..rung import Start
 
