@@ -1,27 +1,24 @@
-"""States and ramps of chains by what is wished of them, each planned once: in this run, and from the cache in any."""
+"""States and ramps of chains by what is wanted of them, each planned once: in this run, and from the cache in any."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
 from .cache import PlanCache
 from .families import strategy_for
-from .held import Held
 from .plan import ChainState, Margins, Ramp
 from .strategy import Strategy
+from .targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget, targets_of
 from .transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
-from .wish import ChainWish, Turned, wishes_of
 
-__all__ = ["Chains", "Held"]
-
-Floats = NDArray[np.float64]
+__all__ = ["Chains"]
 
 # Kept in memory of each: all 64 x 64 ramps of a chain of six would fit.
 MOST_RAMPS = MOST_STATES = 4096
@@ -29,30 +26,35 @@ MOST_RAMPS = MOST_STATES = 4096
 
 @dataclass(frozen=True)
 class _Pair:
-    """A way from one wish to another; `moves` where lam may differ on it from both ends."""
+    """From one target to another, neither of them turned; `moves` where lam may differ on the way from both ends."""
 
-    before: bytes
-    after: bytes
+    before: ChainTarget
+    after: ChainTarget
     moves: bool
 
     @property
+    def plain(self) -> bool:
+        """Whether it leads between amplitudes at will."""
+        return isinstance(self.before, AmplitudeTarget) and isinstance(self.after, AmplitudeTarget)
+
+    @property
     def item(self) -> bytes:
-        return b"ramp%d" % self.moves + len(self.before).to_bytes(4, "little") + self.before + self.after
+        return b"ramp%d" % self.moves + self.before.key + b" to " + self.after.key
 
 
 class Chains:
-    """What the chains of a device do for patterns."""
+    """What the chains of a device do for patterns; in lists of targets, states and ramps they go row by row."""
 
-    def __init__(self, device: Device, contrast_db: float, whole: Chains | None = None, kind: int = 0) -> None:
-        """`whole` : the chains of the device that `device` is one chain of, of this `kind`."""
+    def __init__(self, device: Device, contrast_db: float, whole: Chains | None = None) -> None:
+        """`whole` : the chains of the device that `device` is one chain of."""
         self.device = device
-        self._contrast_db, self._whole, self._kind = contrast_db, whole, kind
+        self._contrast_db, self._whole = contrast_db, whole
         self._cache: PlanCache = PlanCache(device, contrast_db, None if whole is None else whole._cache)
-        self._states: dict[bytes, ChainState] = {}
-        self._turned: dict[Held, ChainState] = {}
+        self._states: dict[ChainTarget, ChainState] = {}
+        self._turned: dict[ChainTarget, ChainState] = {}
         self._ramps: dict[_Pair, Ramp | None] = {}
-        self._turned_ramps: dict[tuple[Held, Held, bool, float], Ramp | None] = {}
-        self._wishes: dict[tuple[bytes, bool], bytes] = {}
+        self._turned_ramps: dict[tuple[ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
+        self._targets: dict[tuple[AmplitudeTarget, bool], ChainTarget] = {}
 
     @cached_property
     def strategy(self) -> Strategy | None:
@@ -60,102 +62,106 @@ class Chains:
         whole = None if self._whole is None else self._whole.strategy
         return strategy_for(self.device, self._contrast_db, whole=whole)
 
-    @property
-    def rest(self) -> Held:
+    @cached_property
+    def rest(self) -> ChainTarget:
         """What a chain holds that has nothing to do."""
-        return Held(bytes(8 * self.device.chain_length), kind=self._kind)
+        return AmplitudeTarget((0.0,) * self.device.chain_length)
 
     @property
-    def at_rest(self) -> list[Held]:
+    def at_rest(self) -> list[ChainTarget]:
         """All chains of the device at rest."""
         return [self.rest] * (self.device.rows * self.device.chains_per_row)
 
-    def hold(self, pattern: TargetPattern, before: list[Held]) -> list[Held]:
+    def hold(self, pattern: TargetPattern, before: Sequence[ChainTarget]) -> list[ChainTarget]:
         """What chains hold for a pattern, given what they held."""
-        wishes = wishes_of(pattern, self.device)
-        held = [self._hold(wish, one) for wish, one in zip(wishes, before, strict=True)]
-        self._plan([one.key for one in held])
-        return held
+        targets = list(map(self.held, targets_of(pattern, self.device), before))
+        self.prepare(targets)
+        return targets
 
-    def _hold(self, wish: Turned, before: Held) -> Held:
-        if isinstance(wish.wish, ChainWish):
-            return Held(wish.wish.key, wish.turn, self._kind)
-        started = ChainWish.of_key(before.key) is None and any(before.key)
-        ask = (wish.wish.tobytes(), started)
-        if ask not in self._wishes:
-            if len(self._wishes) >= MOST_STATES:
-                self._wishes.clear()
-            self._wishes[ask] = self._wished(wish.wish, started)
-        key = self._wishes[ask]
-        return Held(key, wish.turn if any(key) else 0.0, self._kind)
+    def held(self, target: ChainTarget, before: ChainTarget) -> ChainTarget:
+        """What a chain holds for a target, given what it held."""
+        if not isinstance(target, AmplitudeTarget):
+            return target
+        ask = (target.unturned, isinstance(before, AmplitudeTarget) and not before.resting)
+        if ask not in self._targets:
+            if len(self._targets) >= MOST_STATES:
+                self._targets.clear()
+            self._targets[ask] = self._held(*ask)
+        return self._targets[ask].turned(target.turn)
 
-    def _wished(self, amplitude: Floats, started: bool) -> bytes:
+    def _held(self, target: AmplitudeTarget, started: bool) -> ChainTarget:
         if self.strategy is not None:
-            return np.ascontiguousarray(self.strategy.held(amplitude, started), dtype=np.float64).tobytes()
-        if not np.any(amplitude):
-            return amplitude.tobytes()
-        n = len(amplitude)
-        return ChainWish(amplitude, np.full(n, np.nan), np.ones(n)).key
+            return AmplitudeTarget.of(self.strategy.held(target.levels, started))
+        n = len(target.amplitude)
+        return target if target.resting else WaveTarget(target.amplitude, phase=(None,) * n, weight=(1.0,) * n)
 
-    def state(self, held: Held) -> ChainState:
-        """The state for what is held."""
-        if held not in self._turned:
+    def states(self, targets: Sequence[ChainTarget]) -> list[ChainState]:
+        """The states for what chains hold."""
+        return list(map(self.state, targets))
+
+    def state(self, target: ChainTarget) -> ChainState:
+        """The state for what a chain holds."""
+        if target not in self._turned:
             if len(self._turned) >= MOST_STATES:
                 self._turned.clear()
-            self._plan([held.key])
-            self._turned[held] = turned_state(self._states[held.key], held.turn)
-        return self._turned[held]
+            self.prepare([target])
+            self._turned[target] = turned_state(self._states[target.unturned], target.turn)
+        return self._turned[target]
 
-    @staticmethod
-    def waving(held: Held) -> bytes:
-        """The key of a wave; empty for amplitudes made otherwise."""
-        return b"" if ChainWish.of_key(held.key) is None else held.key
+    def under(self, targets: Sequence[ChainTarget], lam: float) -> list[ChainTarget]:
+        """What chains hold, with their links given."""
+        return [target.under(lam) for target in targets]
 
-    def under(self, held: Held, lam: float) -> Held:
-        """What is held, with its links given."""
-        wish = ChainWish.of_key(held.key)
-        return held if wish is None else held._replace(key=replace(wish, lam=lam).key)
-
-    def _plan(self, keys: list[bytes]) -> None:
-        wanted = list(dict.fromkeys(keys))
-        keys = [key for key in wanted if key not in self._states]
-        if keys and len(self._states) + len(keys) > MOST_STATES:
+    def prepare(self, targets: Iterable[ChainTarget]) -> None:
+        """Plan what chains hold for many targets at once, which is quicker than one by one."""
+        wanted = list(dict.fromkeys(target.unturned for target in targets))
+        targets = [target for target in wanted if target not in self._states]
+        if targets and len(self._states) + len(targets) > MOST_STATES:
             self._states.clear()
-            keys = wanted
-        found = self._cache.find([b"state" + key for key in keys]) if keys else []
-        self._states.update((key, state) for key, state in zip(keys, found, strict=True) if state is not None)
-        missing = [key for key, state in zip(keys, found, strict=True) if state is None]
+            targets = wanted
+        known = self._cache.find([b"state" + target.key for target in targets]) if targets else []
+        self._states.update((target, state) for target, state in zip(targets, known, strict=True) if state is not None)
+        missing = [target for target, state in zip(targets, known, strict=True) if state is None]
         if missing:
             made = self._made(missing)
             self._states.update(made)
-            self._cache.keep((b"state" + key, state) for key, state in made.items())
+            self._cache.keep((b"state" + target.key, state) for target, state in made.items())
 
-    def _made(self, keys: list[bytes]) -> dict[bytes, ChainState]:
-        plain = [key for key in keys if len(key) == 8 * self.device.chain_length]
-        made: dict[bytes, ChainState] = {}
+    def _made(self, targets: list[ChainTarget]) -> dict[ChainTarget, ChainState]:
+        plain = [target for target in targets if isinstance(target, AmplitudeTarget)]
+        made: dict[ChainTarget, ChainState] = {}
         if plain and self.strategy is not None:
-            targets = np.array([np.frombuffer(key) for key in plain])
-            made.update(zip(plain, self.strategy.states(targets), strict=True))
+            levels = np.array([target.amplitude for target in plain])
+            made.update(zip(plain, self.strategy.states(levels), strict=True))
         elif plain:
-            made.update((key, _resting(self.device, np.frombuffer(key))) for key in plain)
-        for key in keys:
-            if key not in made:
-                made[key] = self._wave(key)
+            made.update((target, _resting(self.device, target)) for target in plain)
+        for target in targets:
+            if target not in made:
+                made[target] = self._wave(target)
         return made
 
-    def _wave(self, key: bytes) -> ChainState:
+    def _wave(self, target: ChainTarget) -> ChainState:
         from .waves.walking import walking_state
         from .waves.wave_state import wave_state
 
-        wish = ChainWish.of_key(key)
-        assert wish is not None
-        return walking_state(self.device, wish) if wish.width else wave_state(self.device, wish)
+        if isinstance(target, WalkingTarget):
+            return walking_state(self.device, target)
+        assert isinstance(target, WaveTarget)
+        return wave_state(self.device, target)
 
-    def ramp(self, before: Held, after: Held, moves: bool, wait_s: float = 0.0) -> Ramp | None:
-        """The way from one to the other; None where a chain already stands.
+    def ramps(
+        self, before: Sequence[ChainTarget], after: Sequence[ChainTarget], moves: bool, wait_s: float
+    ) -> list[Ramp | None]:
+        """The ways from one to the other; None where a chain already stands.
 
         `wait_s` : how many seconds after the start a wave begins to rise at the earliest.
         """
+        pairs = list(zip(before, after, strict=True))
+        self.prepare_ramps(pairs, moves)
+        return [self.ramp(one, other, moves, wait_s) for one, other in pairs]
+
+    def ramp(self, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float = 0.0) -> Ramp | None:
+        """The way of one chain, as in `ramps`."""
         ask = (before, after, moves, wait_s)
         if before == after:
             return None
@@ -165,24 +171,23 @@ class Chains:
             self._turned_ramps[ask] = self._way(before, after, moves, wait_s)
         return self._turned_ramps[ask]
 
-    def leaving_s(self, before: Held, moves: bool) -> float:
-        """Seconds that a chain takes to come to rest."""
-        ramp = self.ramp(before, self.rest, moves)
-        return 0.0 if ramp is None else ramp.duration_s
+    def leaving_s(self, targets: Sequence[ChainTarget], moves: bool) -> float:
+        """Seconds until all these chains have come to rest."""
+        ramps = (self.ramp(target, self.rest, moves) for target in targets)
+        return max((ramp.duration_s for ramp in ramps if ramp is not None), default=0.0)
 
-    def _way(self, before: Held, after: Held, moves: bool, wait_s: float) -> Ramp | None:
-        rest = self.rest.key
-        direct = before.turn == after.turn or rest in (before.key, after.key)
-        plain = ChainWish.of_key(before.key) is None and ChainWish.of_key(after.key) is None
-        if (plain and direct) or after.key == rest or (before.key == rest and not wait_s):
-            pair = _Pair(before.key, after.key, moves)
+    def _way(self, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float) -> Ramp | None:
+        rest = self.rest
+        pair = _Pair(before.unturned, after.unturned, moves)
+        direct = before.turn == after.turn or rest in (before, after)
+        if (pair.plain and direct) or after == rest or (before == rest and not wait_s):
             self._go([pair])
             ramp = self._ramps[pair]
-            return None if ramp is None else turned_ramp(ramp, before.turn if after.key == rest else after.turn)
+            return None if ramp is None else turned_ramp(ramp, before.turn if after == rest else after.turn)
         ends = self.state(before), self.state(after)
         still = Ramp(t_s=np.zeros(1))
-        out = still if before.key == rest else self._way(before, self.rest, moves, 0.0)
-        back = self._way(self.rest, after, moves, 0.0)
+        out = still if before == rest else self._way(before, rest, moves, 0.0)
+        back = self._way(rest, after, moves, 0.0)
         if out is None or back is None:
             return out or back
         out = as_tone(out, ends[0].omega)
@@ -198,17 +203,16 @@ class Chains:
             return rested(self.device, *ends, whole)
         return whole(0.0)
 
-    def prepare(self, pairs: list[tuple[Held, Held]], moves: bool) -> None:
+    def prepare_ramps(self, pairs: Iterable[tuple[ChainTarget, ChainTarget]], moves: bool) -> None:
         """Plan many ways between amplitudes at once, which is quicker than one by one."""
         if self.strategy is None:
             return
-        size = 8 * self.device.chain_length
         wanted = (
-            _Pair(one.key, other.key, moves)
+            _Pair(one.unturned, other.unturned, moves)
             for one, other in pairs
-            if one.key != other.key and len(one.key) == len(other.key) == size and one.turn == other.turn
+            if one.turn == other.turn and one != other
         )
-        self._go(list(dict.fromkeys(wanted)))
+        self._go([pair for pair in dict.fromkeys(wanted) if pair.plain])
 
     def _go(self, pairs: list[_Pair]) -> None:
         missing = [pair for pair in pairs if pair not in self._ramps]
@@ -217,37 +221,35 @@ class Chains:
         if len(self._ramps) + len(missing) > MOST_RAMPS:
             self._ramps.clear()
             missing = pairs
-        found = self._cache.find([pair.item for pair in missing])
-        self._ramps.update((pair, ramp) for pair, ramp in zip(missing, found, strict=True) if ramp is not None)
-        new = [pair for pair, ramp in zip(missing, found, strict=True) if ramp is None]
+        known = self._cache.find([pair.item for pair in missing])
+        self._ramps.update((pair, ramp) for pair, ramp in zip(missing, known, strict=True) if ramp is not None)
+        new = [pair for pair, ramp in zip(missing, known, strict=True) if ramp is None]
         if new:
             made = dict(zip(new, self._ways(new), strict=True))
             self._ramps.update(made)
             self._cache.keep((pair.item, ramp) for pair, ramp in made.items() if ramp is not None)
 
     def _ways(self, pairs: list[_Pair]) -> list[Ramp | None]:
-        size = 8 * self.device.chain_length
-        plain = [len(pair.before) == len(pair.after) == size for pair in pairs]
-        if all(plain) and self.strategy is not None:
-            before = [self.state(Held(pair.before)) for pair in pairs]
-            return self.strategy.ramps(before, [self.state(Held(pair.after)) for pair in pairs])
+        if all(pair.plain for pair in pairs) and self.strategy is not None:
+            before = [self.state(pair.before) for pair in pairs]
+            return self.strategy.ramps(before, [self.state(pair.after) for pair in pairs])
         return [self._wave_way(pair) for pair in pairs]
 
     def _wave_way(self, pair: _Pair) -> Ramp | None:
         from .transitions.waves import enter_wave, leave_wave
 
-        enters = pair.before == self.rest.key
-        state = self.state(Held(pair.after if enters else pair.before))
+        enters = pair.before == self.rest
+        state = self.state(pair.after if enters else pair.before)
         # What cannot be held is not played.
         if state.outcome is not Outcome.OK or not state.epsilon:
             return None
         return (enter_wave if enters else leave_wave)(self.device, state, pair.moves)
 
 
-def _resting(device: Device, target: Floats) -> ChainState:
+def _resting(device: Device, target: ChainTarget) -> ChainState:
     n = device.chain_length
     silence = np.zeros(n, dtype=np.complex128)
     return ChainState(
-        target=target, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
+        target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
         phasor=silence, mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,
     )  # fmt: skip

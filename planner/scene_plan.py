@@ -72,17 +72,17 @@ class _Frames:
     def __iter__(self) -> Iterator[FramePlan]:
         device, chains = self._device, self._chains
         rate = device.amplifier.rate_hz
-        held = chains.at_rest
+        targets = chains.at_rest
         position = 0
         for frame in self._scene.frames:
-            change = change_to(chains, held, chains.hold(frame.pattern, held))
+            change = change_to(chains, targets, chains.hold(frame.pattern, targets))
             # What cannot be held is not played, and the next frame begins at rest.
             played = all(state.outcome is Outcome.OK for state in change.states)
-            held = change.held if played else chains.at_rest
+            targets = change.targets if played else chains.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
             position += samples
-        change = change_to(chains, held, chains.at_rest)
+        change = change_to(chains, targets, chains.at_rest)
         if any(ramp is not None for ramp in change.ramps):
             longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
             yield self._frame(None, position, int(longest * rate) + 2, change)
@@ -99,7 +99,7 @@ class _Frames:
         whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
-        return replace(whole, spread=self._expected.of(change.held, change.states))
+        return replace(whole, spread=self._expected.of(change.targets, change.states))
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:

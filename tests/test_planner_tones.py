@@ -163,7 +163,7 @@ def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
         held = now
         assert len(chains._turned) <= 8
         assert len(chains._turned_ramps) <= 8
-        assert len(chains._wishes) <= 8
+        assert len(chains._targets) <= 8
         assert len(chains._states) <= 8 + 36
     assert MOST_STATES >= 64
 

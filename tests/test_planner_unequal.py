@@ -69,14 +69,14 @@ def truth(device: Device, place: int, state: ChainState) -> NDArray[np.complex12
 def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[ChainState]:
     chains = UnequalChains(device, 20.0)
     target = TargetPattern(np.asarray(pattern, dtype=np.complex128), phase_matters=phase_matters)
-    return [chains.state(one) for one in chains.hold(target, chains.at_rest)]
+    return chains.states(chains.hold(target, chains.at_rest))
 
 
 @pytest.mark.parametrize("base", [LINKED, PAPER, SINGLE], ids=lambda device: device.name)
 def test_every_chain_holds_its_target_as_it_really_is(base: Device) -> None:
     device = measured(base, 0.01, gain=0.03)
     blind = Chains(base, 20.0)
-    nominal = [blind.state(one) for one in blind.hold(TargetPattern(DOTS.astype(np.complex128)), blind.at_rest)]
+    nominal = blind.states(blind.hold(TargetPattern(DOTS.astype(np.complex128)), blind.at_rest))
     for place, (state, other) in enumerate(zip(held(device, DOTS), nominal, strict=True)):
         assert state.outcome is Outcome.OK
         if state.target.any():

@@ -13,20 +13,19 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TextureError, walking_bars
 from planner import ChainState, Plan, plan_scene
+from planner.targets import WalkingTarget, targets_of
 from planner.transitions.waves import enter_wave
 from planner.waves.two_tones import MAIN, apart
 from planner.waves.walking import walking_rate_hz, walking_state
-from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, SINGLE = (load_device(name) for name in ("paper-6x6", "linked-6x6", "independent-6x6"))
 GRID = GridShape(6, 6)
 
 
 def walk(device: Device, level: float = 0.3, **wish: float) -> ChainState:
-    (first, *_) = wishes_of(walking_bars(GRID, level=level, **wish), device)
-    assert isinstance(first.wish, ChainWish)
-    assert ChainWish.of_key(first.wish.key).key == first.wish.key
-    return walking_state(device, first.wish)
+    (first, *_) = targets_of(walking_bars(GRID, level=level, **wish), device)
+    assert isinstance(first, WalkingTarget)
+    return walking_state(device, first)
 
 
 @pytest.mark.parametrize("rate_hz", [0.4, 1.0, 3.0])

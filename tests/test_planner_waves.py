@@ -14,11 +14,11 @@ from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels
 from planner import ChainState
 from planner.closed_forms.wave_fit import Freedom, Hold, Wanted, fit, response_to
 from planner.margins import converter_error
+from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.two_tones import MAIN, ORDERS, two_tones
 from planner.waves.wave_forms import lag_and_ratio, wave_for, wave_on
 from planner.waves.wave_state import wave_state
-from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, COMMON, SINGLE = (
     load_device(name) for name in ("paper-6x6", "linked-6x6", "paper-6x6-common", "independent-6x6")
@@ -28,9 +28,9 @@ GRID = GridShape(6, 6)
 
 
 def wave(device: Device, lag_deg: float, level: float = 0.3) -> ChainState:
-    (first, *_) = wishes_of(plane_wave(GRID, lag_deg=lag_deg, level=level), device)
-    assert isinstance(first.wish, ChainWish)
-    return wave_state(device, first.wish)
+    (first, *_) = targets_of(plane_wave(GRID, lag_deg=lag_deg, level=level), device)
+    assert isinstance(first, WaveTarget)
+    return wave_state(device, first)
 
 
 @given(st.floats(5, 175), st.floats(0.3, 1.2), st.floats(0.001, 0.02))
@@ -174,9 +174,9 @@ def test_a_fixed_lam_has_its_own_waves() -> None:
 
 def test_links_stop_a_wave_half_way() -> None:
     part = regions(GRID, [Region(0, 6, 0, 4, plane_wave(GRID, lag_deg=60))])
-    (first, *_) = wishes_of(part, LINKED)
-    assert isinstance(first.wish, ChainWish)
-    state = wave_state(LINKED, first.wish)
+    (first, *_) = targets_of(part, LINKED)
+    assert isinstance(first, WaveTarget)
+    state = wave_state(LINKED, first)
     assert state.outcome is Outcome.OK
     np.testing.assert_allclose(np.abs(state.phasor) / LINKED.full_scale, [1, 1, 1, 1, 0, 0], atol=1e-3)
 
@@ -188,9 +188,9 @@ def test_no_formula_a_search_and_the_same_answer_twice() -> None:
     phasor = solve(LINKED.chain, setting, tol=1e-9, rung="harmonic_balance", start="rest").phasor[0]
     turned = phasor / LINKED.full_scale * np.exp(-1j * np.angle(phasor[0]))
     target = TargetPattern(np.tile(turned, (6, 1)), PatternKind.SINE, phase_matters=True)
-    (first, *_) = wishes_of(target, LINKED)
-    assert isinstance(first.wish, ChainWish)
-    state, again = wave_state(LINKED, first.wish), wave_state(LINKED, first.wish)
+    (first, *_) = targets_of(target, LINKED)
+    assert isinstance(first, WaveTarget)
+    state, again = wave_state(LINKED, first), wave_state(LINKED, first)
     assert state.outcome is Outcome.OK
     np.testing.assert_allclose(state.phasor / LINKED.full_scale, turned, atol=1e-3 * np.abs(turned).max())
     assert again.epsilon == state.epsilon
@@ -198,13 +198,12 @@ def test_no_formula_a_search_and_the_same_answer_twice() -> None:
 
 
 @given(st.integers(-180, 180), st.integers(-180, 180), st.floats(0.1, 1))
-def test_rows_of_a_wave_are_one_wish_but_for_a_turn(lag: float, row_lag: float, level: float) -> None:
-    wishes = list(wishes_of(plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level), PAPER))
-    keys = {one.wish.key for one in wishes if isinstance(one.wish, ChainWish)}
-    assert len(keys) == 1
-    back = ChainWish.of_key(keys.pop())
-    assert back is not None
-    whole = np.array([back.amplitude * np.exp(1j * (back.phase + one.turn)) for one in wishes])
+def test_rows_of_a_wave_are_one_target_but_for_a_turn(lag: float, row_lag: float, level: float) -> None:
+    targets = list(targets_of(plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level), PAPER))
+    shared = {one.unturned for one in targets if isinstance(one, WaveTarget)}
+    assert len(shared) == len({one.key for one in shared}) == 1
+    (wave,) = shared
+    whole = np.array([wave.levels * np.exp(1j * (wave.phases + one.turn)) for one in targets])
     np.testing.assert_allclose(
         whole, plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level).amplitude, atol=1e-7
     )
@@ -212,11 +211,11 @@ def test_rows_of_a_wave_are_one_wish_but_for_a_turn(lag: float, row_lag: float, 
 
 def test_amplitudes_alone_are_no_wave() -> None:
     for pattern in (bars(GRID, vertical=True, width=1, gap=1), levels(np.full((6, 6), 0.4))):
-        assert not any(isinstance(one.wish, ChainWish) for one in wishes_of(pattern, PAPER))
+        assert all(isinstance(one, AmplitudeTarget) for one in targets_of(pattern, PAPER))
     mixed = regions(GRID, [Region(0, 2, 0, 6, plane_wave(GRID, lag_deg=60)), Region(2, 6, 0, 6, levels(np.eye(6)))])
-    assert [isinstance(one.wish, ChainWish) for one in wishes_of(mixed, PAPER)] == [True] * 2 + [False] * 4
-    waves = list(wishes_of(plane_wave(GRID, lag_deg=-70), SINGLE))
-    assert not any(isinstance(one.wish, ChainWish) for one in waves)
+    assert [isinstance(one, WaveTarget) for one in targets_of(mixed, PAPER)] == [True] * 2 + [False] * 4
+    waves = list(targets_of(plane_wave(GRID, lag_deg=-70), SINGLE))
+    assert all(isinstance(one, AmplitudeTarget) for one in waves)
     assert waves[1].turn == pytest.approx(math.radians(70))
 
 
@@ -258,7 +257,7 @@ def test_ways_of_waves_and_tones_end_where_they_should() -> None:
 
 def test_single_actuators_take_tones_of_any_place() -> None:
     states = []
-    for one in wishes_of(walking_bars(GRID, width=2, level=0.5), SINGLE):
-        assert isinstance(one.wish, ChainWish)
-        states.append(one.wish.place)
+    for one in targets_of(walking_bars(GRID, width=2, level=0.5), SINGLE):
+        assert isinstance(one, WalkingTarget)
+        states.append(one.place)
     assert states == [0, 1, 2, 3, 4, 5] * 6

@@ -16,13 +16,13 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, plane_wave
 from planner import Plan, Ramp, plan_scene
+from planner.targets import WaveTarget, targets_of
 from planner.transitions.check import SAMPLES_PER_PERIOD, Orbit, Way, travel
 from planner.transitions.fall import CALM, find_fall
 from planner.transitions.limits import WayLimits
 from planner.transitions.rise import orbit_of
 from planner.transitions.steering import LinkCourse, Standing, Steering, rest, smooth_step
 from planner.waves.wave_state import wave_state
-from planner.wish import ChainWish, wishes_of
 
 Floats = NDArray[np.float64]
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")
@@ -36,9 +36,9 @@ LIMITS = WayLimits(
 
 @cache
 def standing(lag_deg: float, level: float) -> tuple[float, Standing]:
-    (first, *_) = wishes_of(plane_wave(GRID, lag_deg=lag_deg, level=level), PAPER)
-    assert isinstance(first.wish, ChainWish)
-    state = wave_state(PAPER, first.wish)
+    (first, *_) = targets_of(plane_wave(GRID, lag_deg=lag_deg, level=level), PAPER)
+    assert isinstance(first, WaveTarget)
+    state = wave_state(PAPER, first)
     return state.omega, Standing(state.epsilon, state.lam, state.phasor)
 
 

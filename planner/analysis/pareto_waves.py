@@ -16,11 +16,11 @@ from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
 from ..plan import ChainState
+from ..targets import WaveTarget, targets_of
 from ..transitions.rise import find_way
 from ..transitions.search import STANDS
 from ..transitions.waves import BUDGET, limits_of
 from ..waves.wave_state import wave_state
-from ..wish import ChainWish, wishes_of
 from .effects import StandingChain
 from .pareto_point import SIGMA, ParetoError, ParetoPoint
 
@@ -40,13 +40,13 @@ def ways_of_waves(pattern: TargetPattern, device: Device) -> tuple[list[ParetoPo
     """
     if device.coupling.closure is not Closure.OPEN:
         raise ParetoError(f"device: {device.name} is of rings, whose waves rise by one slow way; give open chains")
-    wishes = {}
-    for wish, _ in wishes_of(pattern, device):
-        if isinstance(wish, ChainWish):
-            wishes[wish.key] = wish
-        elif np.any(wish):
+    targets: dict[WaveTarget, None] = {}
+    for target in targets_of(pattern, device):
+        if isinstance(target, WaveTarget):
+            targets[target.unturned] = None
+        elif not target.resting:
             raise ParetoError("frame: some of its chains have no phases; give waves alone, or amplitudes alone")
-    states = [wave_state(device, wish) for wish in wishes.values()]
+    states = [wave_state(device, target) for target in targets]
     lacking = next((state.lacking for state in states if state.outcome is not Outcome.OK), "")
     if lacking:
         raise ParetoError(f"frame: {device.name} cannot make it: {lacking}")

@@ -14,7 +14,7 @@ from ..closed_forms.nearest import nearest_geometric
 from ..closed_forms.wave_fit import Fitted
 from ..margins import converter_error, lacking_of, slew_of, well_of
 from ..plan import ChainState, Margins
-from ..wish import ChainWish
+from ..targets import WaveTarget
 from .wave_fit import GOOD, WaveFit
 
 __all__ = ["wave_state"]
@@ -28,13 +28,13 @@ ROUNDING = 2.0
 UNEVEN = 0.1
 
 
-def wave_state(device: Device, wish: ChainWish) -> ChainState:
+def wave_state(device: Device, target: WaveTarget) -> ChainState:
     """The settings for a wave, or for amplitudes that one lam can make.
 
-    Where the wish cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
+    Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
     nearest motion of all.
     """
-    task = WaveFit(device, wish)
+    task = WaveFit(device, target)
     found, share = task.best(1.0), 1.0
     near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
     if not task.stands(found) and not near and not task.jagged:
@@ -45,7 +45,7 @@ def wave_state(device: Device, wish: ChainWish) -> ChainState:
 
 @dataclass(frozen=True)
 class _Told:
-    """What was found for `share` of a wish, to be told."""
+    """What was found for `share` of a target, to be told."""
 
     task: WaveFit
     found: Fitted
@@ -61,7 +61,7 @@ class _Told:
         margins = self._margins() if known else Margins(0.0, 0.0)
         lacking = self._lacking(error, noise) or lacking_of(margins)
         return ChainState(
-            target=task.wish.amplitude,
+            target=task.target.levels,
             epsilon=hold.epsilon,
             lam=hold.lam,
             bias=np.zeros(n),
@@ -71,7 +71,7 @@ class _Told:
             error=error / device.full_scale,
             margins=margins,
             outcome=Outcome.UNREACHABLE if lacking else Outcome.OK,
-            phase=task.wish.phase if np.any(task.phased) else None,
+            phase=task.target.phases if np.any(task.phased) else None,
             lacking=lacking,
         )
 
@@ -87,7 +87,7 @@ class _Told:
         )
 
     def _lacking(self, error: float, noise: float) -> str:
-        """One clause on what keeps the device from the wish, "" when nothing."""
+        """One clause on what keeps the device from the target, "" when nothing."""
         task, found, scale = self.task, self.found, self.task.scale
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
@@ -105,11 +105,11 @@ class _Told:
 
     def _uneven(self) -> bool:
         """Whether neighbours are to differ as one lam and one drive never let them."""
-        device, target = self.task.device, self.task.wish.amplitude
+        device, levels = self.task.device, self.task.target.levels
         if device.coupling.scope == "link":
             return False
-        near = nearest_geometric(device, target, 1.0)
-        return bool(np.abs(near.first * near.ratio ** np.arange(len(target)) - target).max() > UNEVEN)
+        near = nearest_geometric(device, levels, 1.0)
+        return bool(np.abs(near.first * near.ratio ** np.arange(len(levels)) - levels).max() > UNEVEN)
 
     def _out_of_range(self) -> str:
         hold, lam, omega = self.found.hold, self.task.device.coupling.lam, self.task.device.omega
