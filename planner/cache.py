@@ -19,7 +19,8 @@ import numpy as np
 
 from chainsim import Device, Outcome
 
-from .plan import ChainState, Margins, Ramp, Tone, ToneRamp
+from .operating_point import Margins, OperatingPoint, Tone
+from .plan import Ramp, ToneRamp
 
 __all__ = ["PlanCache", "cache_path"]
 
@@ -101,7 +102,7 @@ class PlanCache:
             self._give_up(error)
             return [None] * len(items)
 
-    def _sound(self, key: bytes, raw: object) -> ChainState | Ramp | None:
+    def _sound(self, key: bytes, raw: object) -> OperatingPoint | Ramp | None:
         """What a row holds; a damaged one is deleted, so that it is planned and kept again."""
         try:
             if not isinstance(raw, bytes):
@@ -115,7 +116,7 @@ class PlanCache:
                 self._connection.execute("DELETE FROM plans WHERE key = ?", (key,))
             return None
 
-    def keep(self, items: Iterable[tuple[bytes, ChainState | Ramp]]) -> None:
+    def keep(self, items: Iterable[tuple[bytes, OperatingPoint | Ramp]]) -> None:
         """Keep plans for later runs."""
         if self._connection is None:
             return
@@ -130,7 +131,7 @@ class PlanCache:
             self._give_up(error)
 
 
-def _packed(value: ChainState | Ramp) -> bytes:
+def _packed(value: OperatingPoint | Ramp) -> bytes:
     """Plain values as a line of JSON, then the arrays as NPY; no pickle."""
     arrays: list[np.ndarray[Any, Any]] = []
     plain = _plain(value, arrays)
@@ -160,7 +161,7 @@ def _empty(header: bytes) -> np.ndarray[Any, Any]:
     return np.empty(shape, dtype)
 
 
-_PARTS = {kind.__name__: kind for kind in (ChainState, Margins, Ramp, Tone, ToneRamp)}
+_PARTS = {kind.__name__: kind for kind in (OperatingPoint, Margins, Ramp, Tone, ToneRamp)}
 
 
 def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
@@ -176,7 +177,7 @@ def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
     return [_plain(one, arrays) for one in item] if isinstance(item, tuple) else item
 
 
-def _unpacked(raw: bytes) -> ChainState | Ramp:
+def _unpacked(raw: bytes) -> OperatingPoint | Ramp:
     at = raw.index(b"\n") + 1
     plain = json.loads(raw[:at])
     # Arrays lie in the order of their numbers; bytes 8 and 9 of each say how long its header is.
@@ -188,7 +189,7 @@ def _unpacked(raw: bytes) -> ChainState | Ramp:
         array = np.frombuffer(raw[begin:at], kind.dtype).reshape(kind.shape)
         arrays.append(array)
     value = _whole(plain, arrays)
-    if not isinstance(value, ChainState | Ramp):
+    if not isinstance(value, OperatingPoint | Ramp):
         raise ValueError("neither a state nor a ramp")
     return value
 

@@ -13,7 +13,8 @@ from encoders import TargetPattern
 
 from .cache import PlanCache
 from .families import strategy_for
-from .plan import ChainState, Margins, Ramp
+from .operating_point import Margins, OperatingPoint
+from .plan import Ramp
 from .strategy import Strategy
 from .targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget, targets_of
 from .transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
@@ -50,8 +51,8 @@ class Chains:
         self.device = device
         self._contrast_db, self._whole = contrast_db, whole
         self._cache: PlanCache = PlanCache(device, contrast_db, None if whole is None else whole._cache)
-        self._states: dict[ChainTarget, ChainState] = {}
-        self._turned: dict[ChainTarget, ChainState] = {}
+        self._states: dict[ChainTarget, OperatingPoint] = {}
+        self._turned: dict[ChainTarget, OperatingPoint] = {}
         self._ramps: dict[_Pair, Ramp | None] = {}
         self._turned_ramps: dict[tuple[ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
         self._targets: dict[tuple[AmplitudeTarget, bool], ChainTarget] = {}
@@ -95,11 +96,11 @@ class Chains:
         n = len(target.amplitude)
         return target if target.resting else WaveTarget(target.amplitude, phase=(None,) * n, weight=(1.0,) * n)
 
-    def states(self, targets: Sequence[ChainTarget]) -> list[ChainState]:
+    def states(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
         """The states for what chains hold."""
         return list(map(self.state, targets))
 
-    def state(self, target: ChainTarget) -> ChainState:
+    def state(self, target: ChainTarget) -> OperatingPoint:
         """The state for what a chain holds."""
         if target not in self._turned:
             if len(self._turned) >= MOST_STATES:
@@ -127,9 +128,9 @@ class Chains:
             self._states.update(made)
             self._cache.keep((b"state" + target.key, state) for target, state in made.items())
 
-    def _made(self, targets: list[ChainTarget]) -> dict[ChainTarget, ChainState]:
+    def _made(self, targets: list[ChainTarget]) -> dict[ChainTarget, OperatingPoint]:
         plain = [target for target in targets if isinstance(target, AmplitudeTarget)]
-        made: dict[ChainTarget, ChainState] = {}
+        made: dict[ChainTarget, OperatingPoint] = {}
         if plain and self.strategy is not None:
             levels = np.array([target.amplitude for target in plain])
             made.update(zip(plain, self.strategy.states(levels), strict=True))
@@ -140,7 +141,7 @@ class Chains:
                 made[target] = self._wave(target)
         return made
 
-    def _wave(self, target: ChainTarget) -> ChainState:
+    def _wave(self, target: ChainTarget) -> OperatingPoint:
         from .waves.walking import walking_state
         from .waves.wave_state import wave_state
 
@@ -246,10 +247,10 @@ class Chains:
         return (enter_wave if enters else leave_wave)(self.device, state, pair.moves)
 
 
-def _resting(device: Device, target: ChainTarget) -> ChainState:
+def _resting(device: Device, target: ChainTarget) -> OperatingPoint:
     n = device.chain_length
     silence = np.zeros(n, dtype=np.complex128)
-    return ChainState(
+    return OperatingPoint(
         target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
         phasor=silence, mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,
     )  # fmt: skip

@@ -10,7 +10,8 @@ import numpy as np
 from chainsim import Outcome
 
 from .chains import Chains
-from .plan import ChainState, Ramp
+from .operating_point import OperatingPoint
+from .plan import Ramp
 from .targets import AmplitudeTarget, ChainTarget
 
 __all__ = ["Change", "change_to"]
@@ -21,7 +22,7 @@ class Change:
     """What every chain holds after a change, and its way there; row by row, chain by chain."""
 
     targets: list[ChainTarget]
-    states: tuple[ChainState, ...]
+    states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
 
 
@@ -68,7 +69,7 @@ def _one_lam(chains: Chains, after: list[ChainTarget]) -> list[ChainTarget]:
     return chains.under(after, float(driven[0]))
 
 
-def _one_drive(states: list[ChainState]) -> list[ChainState]:
+def _one_drive(states: list[OperatingPoint]) -> list[OperatingPoint]:
     """States as they are when all chains are driven like most of those that are driven."""
     driven = [(state.epsilon, state.omega) for state in states if state.moving]
     if not driven or (len(driven) == len(states) and len(set(driven)) == 1):
@@ -78,7 +79,7 @@ def _one_drive(states: list[ChainState]) -> list[ChainState]:
     return [_driven_like(state, model) for state in states]
 
 
-def _driven_like(state: ChainState, model: ChainState) -> ChainState:
+def _driven_like(state: OperatingPoint, model: OperatingPoint) -> OperatingPoint:
     scale = float(np.abs(model.phasor).max()) / max(float(model.target.max()), 1e-12)
     reached = np.abs(model.phasor) / scale
     away = np.abs(reached - state.target)

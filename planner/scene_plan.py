@@ -13,7 +13,8 @@ from encoders import Frame, Scene
 from .chains import Chains
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
 from .frame_change import Change, change_to
-from .plan import ChainState, FramePlan, Plan
+from .operating_point import OperatingPoint
+from .plan import FramePlan, Plan
 
 if TYPE_CHECKING:
     from .robustness.expected import Expectation
@@ -111,7 +112,7 @@ class _Frames:
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
         return plan
 
-    def _note(self, state: ChainState) -> str:
+    def _note(self, state: OperatingPoint) -> str:
         if state.outcome is not Outcome.UNREACHABLE:
             return state.outcome.sentence
         if state.lacking:

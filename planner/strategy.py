@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-from .plan import ChainState, Ramp
+from .operating_point import OperatingPoint
+from .plan import Ramp
 
 __all__ = ["Strategy"]
 
@@ -34,11 +35,11 @@ class Strategy(ABC):
         """Longest ramp in seconds."""
 
     @abstractmethod
-    def states(self, targets: Floats) -> list[ChainState]:
+    def states(self, targets: Floats) -> list[OperatingPoint]:
         """What chains hold for `targets`, float64, shape (P, n), in units of full scale."""
 
     @abstractmethod
-    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+    def ramps(self, before: list[OperatingPoint], after: list[OperatingPoint]) -> list[Ramp | None]:
         """How chains get from state to state; None where nothing has to change."""
 
     @abstractmethod

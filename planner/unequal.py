@@ -14,7 +14,8 @@ from encoders import TargetPattern
 
 from .chains import MOST_STATES, Chains
 from .families import strategy_for
-from .plan import ChainState, Ramp
+from .operating_point import OperatingPoint
+from .plan import Ramp
 from .strategy import Strategy
 from .targets import ChainTarget, targets_of
 
@@ -47,7 +48,7 @@ class UnequalChains(Chains):
                     self._units.append(device.lam_gain(row, index) if own else device.lam_unit(row, index))
                 self._kind_at.append(kind)
         self._chains = [Chains(alone, contrast_db, self) for alone in self._alone]
-        self._set: dict[tuple[int, ChainTarget], ChainState] = {}
+        self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
         self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
 
     @cached_property
@@ -63,18 +64,18 @@ class UnequalChains(Chains):
             chains.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
         return targets
 
-    def states(self, targets: Sequence[ChainTarget]) -> list[ChainState]:
+    def states(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
         """The states for what chains hold, as the device is set to them."""
         return [self._set_to(kind, target) for kind, target in zip(self._kind_at, targets, strict=True)]
 
-    def _set_to(self, kind: int, target: ChainTarget) -> ChainState:
+    def _set_to(self, kind: int, target: ChainTarget) -> OperatingPoint:
         if (kind, target) not in self._set:
             if len(self._set) >= MOST_STATES:
                 self._set.clear()
             self._set[(kind, target)] = self._state(kind, self._chains[kind].state(target))
         return self._set[(kind, target)]
 
-    def _state(self, kind: int, state: ChainState) -> ChainState:
+    def _state(self, kind: int, state: OperatingPoint) -> OperatingPoint:
         gain, span = self._drive(kind), self.device.coupling.lam
         tones = tuple(replace(tone, epsilon=tone.epsilon * gain) for tone in state.tones)
         lam = state.lam / self._units[kind]
@@ -87,15 +88,15 @@ class UnequalChains(Chains):
             return replace(done, outcome=Outcome.UNREACHABLE, lacking=lacking)
         return self._under_one_lam(kind, state, done)
 
-    def _under_one_lam(self, kind: int, state: ChainState, done: ChainState) -> ChainState:
+    def _under_one_lam(self, kind: int, state: OperatingPoint, done: OperatingPoint) -> OperatingPoint:
         """A wave as it is when links differ that have one lam: it was planned for their mean."""
         device = self._alone[kind]
         gain = device.lam_gain(0)
         if device.coupling.scope == "link" or not state.epsilon or state.tones or np.all(gain == 1.0):
             return done
-        from .closed_forms.wave_fit import Hold, response_to
+        from .closed_forms.wave_fit import response_to
 
-        real = response_to(device.chain, Hold(state.epsilon, state.lam * gain, state.omega), state.phasor).phasor[0]
+        real = response_to(device.chain, replace(state, lam=state.lam * gain), state.phasor).phasor[0]
         away = float(np.abs(real - state.phasor).max())
         if away <= TOLD * float(np.abs(state.phasor).max()):
             return replace(done, error=done.error + away / device.full_scale)

@@ -18,11 +18,11 @@ from planner.amplitudes.band import choose_band
 from planner.amplitudes.vibration import Vibration
 from planner.chains import Chains
 from planner.closed_forms.links import drive_for, links_for
+from planner.operating_point import OperatingPoint
 from planner.outlook import FrameSpread
 from planner.robustness import expected as expected_module
 from planner.robustness.expected import WANTED, Expectation
 from planner.robustness.robust_aim import aim_for
-from planner.robustness.robust_search import Held as Settings
 from planner.robustness.robust_search import Search, Trial
 from planner.robustness.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
 from planner.targets import WalkingTarget
@@ -157,9 +157,9 @@ def test_bars_that_walk_are_judged_tone_by_tone(monkeypatch: pytest.MonkeyPatch)
     assert loose.expected > 20 * tight.expected
 
 
-def settings(device: Device, amplitude: Floats, omega: float) -> Settings:
+def settings(device: Device, amplitude: Floats, omega: float) -> OperatingPoint:
     chain = device.chain
-    return Settings(float(drive_for(chain, amplitude[:1], omega)[0]), links_for(chain, amplitude, omega), omega)
+    return OperatingPoint(float(drive_for(chain, amplitude[:1], omega)[0]), links_for(chain, amplitude, omega), omega)
 
 
 def test_the_worst_of_several_copies_is_what_it_says() -> None:

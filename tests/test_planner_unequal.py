@@ -17,7 +17,7 @@ from planner.amplitudes import vibration as vibration_module
 from planner.amplitudes.refine import refine
 from planner.cache import PlanCache
 from planner.chains import Chains
-from planner.plan import ChainState
+from planner.operating_point import OperatingPoint
 from planner.unequal import UnequalChains
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ def measured(device: Device, sigma: float, *, gain: float = 0.0, rows: tuple[int
     return device.model_copy(update={"actuators": tuple(actuators)})
 
 
-def truth(device: Device, place: int, state: ChainState) -> NDArray[np.complex128]:
+def truth(device: Device, place: int, state: OperatingPoint) -> NDArray[np.complex128]:
     """What a chain of the device does when it is set to a state, in units of full scale."""
     row, index = divmod(place, device.chains_per_row)
     chain = device.chain_at(row, index)
@@ -66,7 +66,7 @@ def truth(device: Device, place: int, state: ChainState) -> NDArray[np.complex12
     return np.asarray(answer.phasor[0] / device.full_scale)
 
 
-def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[ChainState]:
+def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[OperatingPoint]:
     chains = UnequalChains(device, 20.0)
     target = TargetPattern(np.asarray(pattern, dtype=np.complex128), phase_matters=phase_matters)
     return chains.states(chains.hold(target, chains.at_rest))

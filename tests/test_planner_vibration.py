@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Device, Outcome, Span, load_device
-from planner import ChainState, Ramp
+from planner import OperatingPoint, Ramp
 from planner.amplitudes.vibration import Vibration
 from planner.families import strategy_for
 
@@ -27,7 +27,7 @@ def vibration(device: Device = LINKED, contrast_db: float = 20.0) -> Vibration:
     return strategy
 
 
-def standing(strategy: Vibration) -> list[ChainState]:
+def standing(strategy: Vibration) -> list[OperatingPoint]:
     """All 64 rows as a chain holds them that has moved before."""
     return strategy.states(np.array([strategy.held(row, True) for row in ROWS]))
 
@@ -38,11 +38,11 @@ def strategy() -> Vibration:
 
 
 @pytest.fixture(scope="module")
-def states(strategy: Vibration) -> list[ChainState]:
+def states(strategy: Vibration) -> list[OperatingPoint]:
     return standing(strategy)
 
 
-def test_all_rows_are_held(states: list[ChainState]) -> None:
+def test_all_rows_are_held(states: list[OperatingPoint]) -> None:
     for row, state in zip(ROWS, states, strict=True):
         assert state.outcome is Outcome.OK
         assert state.error < 1e-7
@@ -55,7 +55,7 @@ def test_all_rows_are_held(states: list[ChainState]) -> None:
         assert LINKED.omega.min <= state.omega <= LINKED.omega.max
 
 
-def test_margins_are_sane(states: list[ChainState]) -> None:
+def test_margins_are_sane(states: list[OperatingPoint]) -> None:
     for state in states:
         assert state.margins.volts == pytest.approx(abs(state.epsilon) / LINKED.epsilon_max)
         assert 0 < state.margins.volts < 0.51
@@ -94,14 +94,14 @@ def test_rest_is_silence(strategy: Vibration) -> None:
     assert not rest.phasor.any()
 
 
-def test_states_do_not_depend_on_their_company(strategy: Vibration, states: list[ChainState]) -> None:
+def test_states_do_not_depend_on_their_company(strategy: Vibration, states: list[OperatingPoint]) -> None:
     for index in (1, 22, 63):
         (alone,) = strategy.states(states[index].target[None])
         np.testing.assert_allclose(alone.lam, states[index].lam, rtol=1e-7)
         assert alone.epsilon == pytest.approx(states[index].epsilon, rel=1e-7)
 
 
-def check_ramp(ramp: Ramp, before: ChainState, after: ChainState) -> None:
+def check_ramp(ramp: Ramp, before: OperatingPoint, after: OperatingPoint) -> None:
     """A ramp within the device that begins and ends in the states; a chain at rest takes any links."""
     assert ramp.lacking == ""
     assert ramp.duration_s <= 0.35
@@ -118,7 +118,7 @@ def check_ramp(ramp: Ramp, before: ChainState, after: ChainState) -> None:
             np.testing.assert_allclose(ramp.lam[node], state.lam, rtol=1e-13)
 
 
-def test_two_hundred_changes(strategy: Vibration, states: list[ChainState]) -> None:
+def test_two_hundred_changes(strategy: Vibration, states: list[OperatingPoint]) -> None:
     rng = np.random.default_rng(11)
     before, after = ([states[i] for i in rng.integers(0, 64, 200)] for _ in range(2))
     for one, other, ramp in zip(before, after, strategy.ramps(before, after), strict=True):
@@ -128,7 +128,7 @@ def test_two_hundred_changes(strategy: Vibration, states: list[ChainState]) -> N
             check_ramp(ramp, one, other)
 
 
-def test_the_way_in_and_out_of_every_row(strategy: Vibration, states: list[ChainState]) -> None:
+def test_the_way_in_and_out_of_every_row(strategy: Vibration, states: list[OperatingPoint]) -> None:
     rest = strategy.states(np.zeros((64, 6)))
     for state, way_in, way_out in zip(states, strategy.ramps(rest, states), strategy.ramps(states, rest), strict=True):
         check_ramp(way_in, rest[0], state)
@@ -137,7 +137,7 @@ def test_the_way_in_and_out_of_every_row(strategy: Vibration, states: list[Chain
     assert strategy.ramps(rest[:1], rest[:1]) == [None]
 
 
-def test_slopes_are_the_derivatives(strategy: Vibration, states: list[ChainState]) -> None:
+def test_slopes_are_the_derivatives(strategy: Vibration, states: list[OperatingPoint]) -> None:
     (rest,) = strategy.states(np.zeros((1, 6)))
     for ramp in strategy.ramps([states[37], rest], [states[22], states[37]]):
         middle = np.arange(2, len(ramp.t_s) - 2)
@@ -189,7 +189,7 @@ def integrated(
     ids=["mixed", "full"],
 )
 def test_a_short_story_under_the_full_equations(
-    rows: tuple[int, ...], rtol: float, strategy: Vibration, states: list[ChainState]
+    rows: tuple[int, ...], rtol: float, strategy: Vibration, states: list[OperatingPoint]
 ) -> None:
     """Rest, patterns, rest: patterns within 2 % of full scale from the first period on, silence below the floor.
 
@@ -254,7 +254,7 @@ def test_near_the_hilltop_no_number_is_called_right(full_scale: float) -> None:
         assert state.outcome is not Outcome.OK
 
 
-def test_a_ramp_says_what_it_lacks(strategy: Vibration, states: list[ChainState]) -> None:
+def test_a_ramp_says_what_it_lacks(strategy: Vibration, states: list[OperatingPoint]) -> None:
     steady = max(abs(state.epsilon) for state in states) / LINKED.epsilon_per_volt
     few_volts = weak(amplifier=LINKED.amplifier.model_copy(update={"volts": 0.5 * steady}))
     few_links = weak(coupling=LINKED.coupling.model_copy(update={"lam": Span(min=0.0, max=0.3)}))

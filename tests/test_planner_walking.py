@@ -12,7 +12,7 @@ from chainsim import Device, Outcome, load_device
 from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TextureError, walking_bars
-from planner import ChainState, Plan, plan_scene
+from planner import OperatingPoint, Plan, plan_scene
 from planner.targets import WalkingTarget, targets_of
 from planner.transitions.waves import enter_wave
 from planner.waves.two_tones import MAIN, apart
@@ -22,7 +22,7 @@ PAPER, LINKED, SINGLE = (load_device(name) for name in ("paper-6x6", "linked-6x6
 GRID = GridShape(6, 6)
 
 
-def walk(device: Device, level: float = 0.3, **wish: float) -> ChainState:
+def walk(device: Device, level: float = 0.3, **wish: float) -> OperatingPoint:
     (first, *_) = targets_of(walking_bars(GRID, level=level, **wish), device)
     assert isinstance(first, WalkingTarget)
     return walking_state(device, first)

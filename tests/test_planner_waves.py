@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setting, Span, load_device, solve
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
-from planner import ChainState
-from planner.closed_forms.wave_fit import Freedom, Hold, Wanted, fit, response_to
+from planner import OperatingPoint
+from planner.closed_forms.wave_fit import Freedom, Wanted, fit, response_to
 from planner.margins import converter_error
 from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
@@ -27,7 +27,7 @@ CHAIN = PAPER.chain
 GRID = GridShape(6, 6)
 
 
-def wave(device: Device, lag_deg: float, level: float = 0.3) -> ChainState:
+def wave(device: Device, lag_deg: float, level: float = 0.3) -> OperatingPoint:
     (first, *_) = targets_of(plane_wave(GRID, lag_deg=lag_deg, level=level), device)
     assert isinstance(first, WaveTarget)
     return wave_state(device, first)
@@ -54,7 +54,7 @@ def test_the_closed_form_of_a_ring_too(closure: Closure) -> None:
     chain = Chain(n=6, delta=CHAIN.delta, beta=-1.0, closure=closure)
     made = wave_for(chain, amplitude=0.02, lag=math.radians(80))
     wanted = 0.02 * np.exp(-1j * math.radians(80) * np.arange(6))
-    held = response_to(chain, Hold(made.epsilon, np.full(5, made.lam), made.omega), wanted)
+    held = response_to(chain, made, wanted)
     np.testing.assert_allclose(held.phasor[0], wanted, atol=1e-5 * 0.02)
 
 
@@ -70,16 +70,16 @@ def test_refinement_finds_settings_that_were_hidden() -> None:
     """From a wave of another lag and amplitude back to that of known settings, whatever the start."""
     hidden = wave_for(CHAIN, amplitude=0.05, lag=math.radians(100))
     shape = 0.05 * np.exp(-1j * math.radians(100) * np.arange(6))
-    target = response_to(CHAIN, Hold(hidden.epsilon, np.full(5, hidden.lam), hidden.omega), shape).phasor[0]
+    target = response_to(CHAIN, hidden, shape).phasor[0]
     start = wave_for(CHAIN, amplitude=0.045, lag=math.radians(95))
     found = fit(
         CHAIN, Wanted(target, np.ones(6, dtype=np.bool_), np.ones(6)),
-        Hold(start.epsilon, np.full(5, start.lam), start.omega), Freedom(1, 0.0, 0.05, 0.9, 1.1),
+        start, Freedom(1, 0.0, 0.05, 0.9, 1.1),
     )  # fmt: skip
     assert found.error < 1e-8
-    assert found.hold.omega == pytest.approx(hidden.omega, rel=1e-6)
-    assert found.hold.lam[0] == pytest.approx(hidden.lam, rel=1e-5)
-    assert found.hold.epsilon == pytest.approx(hidden.epsilon, rel=1e-5)
+    assert found.point.omega == pytest.approx(hidden.omega, rel=1e-6)
+    assert found.point.lam[0] == pytest.approx(hidden.lam[0], rel=1e-5)
+    assert found.point.epsilon == pytest.approx(hidden.epsilon, rel=1e-5)
 
 
 @pytest.mark.parametrize("lag_deg", [15, 60, 90, 120, 165])
@@ -123,9 +123,9 @@ def test_the_converter_error_is_that_of_shaped_noise() -> None:
     rate = amplifier.rate_hz / device.tau_per_s
     density = step**2 / 12 / (math.pi * rate) * (2 * math.sin(1 / rate / 2)) ** 4
     expected = math.sqrt(density * math.pi / (2 * device.delta))
-    found = converter_error(device, Hold(0.01 + 0j, np.zeros(0), 1.0))
+    found = converter_error(device, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0))
     assert found == pytest.approx(expected, rel=0.05)
-    assert converter_error(SINGLE, Hold(0.01 + 0j, np.zeros(0), 1.0)) == 0
+    assert converter_error(SINGLE, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0)) == 0
 
 
 def narrowed(**changes: object) -> Device:
@@ -167,7 +167,7 @@ def test_a_fixed_lam_has_its_own_waves() -> None:
     device = narrowed(coupling=Coupling(scope="fixed", lam=Span(min=7e-3, max=7e-3)))
     made = wave_on(device.chain, amplitude=0.3 * device.full_scale, lam=7e-3, long=True)
     assert made is not None
-    stiff = 1 - made.omega**2 + 0.75 * device.beta * (0.3 * device.full_scale) ** 2 + made.lam
+    stiff = 1 - made.omega**2 + 0.75 * device.beta * (0.3 * device.full_scale) ** 2 + made.lam[0]
     lag = math.degrees(math.atan2(device.delta * made.omega, stiff))
     assert wave(device, lag).outcome is Outcome.OK
 

@@ -11,7 +11,8 @@ from chainsim import Closure, Outcome, Setting, solve
 
 from ..closed_forms.links import stages
 from ..margins import WELL_SHARE
-from ..plan import ChainState, Margins, Ramp
+from ..operating_point import Margins, OperatingPoint
+from ..plan import Ramp
 from ..strategy import Strategy
 from ..transitions import jets
 
@@ -57,7 +58,7 @@ class Deflection(Strategy):
             links[1:] *= device.lam_gain(0)
         return links
 
-    def states(self, targets: Floats) -> list[ChainState]:
+    def states(self, targets: Floats) -> list[OperatingPoint]:
         """Static settings for `targets`, checked by the static solver."""
         device = self.device
         biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
@@ -71,7 +72,7 @@ class Deflection(Strategy):
         response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
         error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
         return [
-            ChainState(
+            OperatingPoint(
                 target=targets[i],
                 epsilon=0j,
                 lam=lam,
@@ -119,7 +120,7 @@ class Deflection(Strategy):
         """What is lacking when a deflection cannot be held."""
         return f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well."
 
-    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+    def ramps(self, before: list[OperatingPoint], after: list[OperatingPoint]) -> list[Ramp | None]:
         """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
         duration = self.ramp_s * self.device.tau_per_s
         blend = jets.smoothstep(SMOOTHNESS, NODES, 4)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..amplitudes.deflection import SMOOTHNESS, Deflection
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
 from ..transitions import jets
-from .effects import StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoPoint
 
 __all__ = ["ways_of_deflections"]
@@ -72,9 +72,9 @@ def _peak(bias: Floats | None) -> float:
     return 0.0 if bias is None else float(np.abs(bias).max())
 
 
-def _scatter(device: Device, state: ChainState) -> float:
+def _scatter(device: Device, state: OperatingPoint) -> float:
     """Standard deviation of the worst actuator while the deflection stands, in units of full scale."""
-    scattered = StandingChain.of(device, state).scattered(SIGMA, np.zeros(device.chain_length, np.bool_))
+    scattered = Linearisation(device.chain, state).scattered(SIGMA, np.zeros(device.chain_length, np.bool_))
     return float(scattered.max()) / device.full_scale
 
 

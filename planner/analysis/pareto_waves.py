@@ -15,13 +15,13 @@ import numpy as np
 from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
 from ..targets import WaveTarget, targets_of
 from ..transitions.rise import find_way
 from ..transitions.search import STANDS
 from ..transitions.waves import BUDGET, limits_of
 from ..waves.wave_state import wave_state
-from .effects import StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoError, ParetoPoint
 
 __all__ = ["ways_of_waves"]
@@ -71,11 +71,11 @@ def _both(one: ParetoPoint, other: ParetoPoint) -> ParetoPoint:
     return replace(one, **worse)
 
 
-def _ways(device: Device, state: ChainState) -> list[ParetoPoint]:
+def _ways(device: Device, state: OperatingPoint) -> list[ParetoPoint]:
     """Ways to one wave; empty where none is found."""
     limits = limits_of(device, device.coupling.scope in ("chain", "link"))
     phased = np.zeros(device.chain_length, np.bool_) if state.phase is None else np.isfinite(state.phase)
-    scattered = StandingChain.of(device, state).scattered(SIGMA, phased)
+    scattered = Linearisation(device.chain, state).scattered(SIGMA, phased)
     spread = float(scattered.max()) / device.full_scale
     # What a way may leave, of each amplitude, counts to the error.
     made = STANDS / 2 * float(state.target.max())

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..closed_forms.links import drive_for, links_for
-from ..closed_forms.wave_fit import Hold
 from ..margins import converter_error
+from ..operating_point import OperatingPoint
 from ..outlook import FrameSpread, TradePoint
-from ..plan import ChainState
 from ..targets import AmplitudeTarget, ChainTarget
 from .batch_march import Parts, march
 from .spread import (
@@ -93,7 +92,7 @@ class Expectation:
         self._traded: dict[tuple[int, bytes], tuple[TradePoint, ...]] = {}
         self._frames: dict[tuple[ChainTarget, ...], FrameSpread | None] = {}
 
-    def of(self, targets: Sequence[ChainTarget], states: Sequence[ChainState]) -> FrameSpread | None:
+    def of(self, targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> FrameSpread | None:
         """A frame that is made as planned, chain by chain; None where nothing moves."""
         key = tuple(targets)
         if key not in self._frames:
@@ -102,7 +101,7 @@ class Expectation:
             self._frames[key] = self._made(targets, states)
         return self._frames[key]
 
-    def _made(self, targets: Sequence[ChainTarget], states: Sequence[ChainState]) -> FrameSpread | None:
+    def _made(self, targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> FrameSpread | None:
         busy = [i for i, state in enumerate(states) if state.moving or np.any(state.bias) or np.any(state.target)]
         if not busy:
             return None
@@ -125,7 +124,7 @@ class Expectation:
         )
 
     def _needed(
-        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[ChainState], now: float
+        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], now: float
     ) -> float:
         """The part of the spread at which the wanted yield is reached, between those tried.
 
@@ -149,7 +148,7 @@ class Expectation:
         share = (WANTED - yields[bad]) / (yields[good] - yields[bad])
         return float(factors[bad] * (factors[good] / factors[bad]) ** share)
 
-    def _exact(self, i: int, target: ChainTarget, state: ChainState) -> ChainState:
+    def _exact(self, i: int, target: ChainTarget, state: OperatingPoint) -> OperatingPoint:
         """A state that aims beside its wish, as it would be if it did not."""
         wish, device = _wanted(target, state), self._device
         if np.array_equal(wish, state.target):
@@ -161,7 +160,7 @@ class Expectation:
         return replace(state, epsilon=complex(epsilon), lam=lam, target=wish)
 
     def _all(
-        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[ChainState], factor: float
+        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], factor: float
     ) -> _Drawn:
         """All chains of a frame; those with phases together, because a phase they share makes no difference."""
         phased = [i for i in busy if states[i].phase is not None]
@@ -177,7 +176,7 @@ class Expectation:
         return _Drawn(np.max([one.error for one in found], axis=0), np.all([one.right for one in found], axis=0))
 
     def _judged(
-        self, places: list[int], targets: Sequence[ChainTarget], states: Sequence[ChainState], factor: float
+        self, places: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], factor: float
     ) -> _Drawn:
         device = self._device
         there = [replace(states[i], target=_wanted(targets[i], states[i])) for i in places]
@@ -187,7 +186,7 @@ class Expectation:
             return _toned(device, set_to[0], parts)
         ring = None if device.coupling.closure is Closure.OPEN else centre_of(device, places)
         report = judge(wish_of(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD)
-        noise = max(converter_error(device, Hold(one.epsilon, one.lam, one.omega)) for one in there)
+        noise = max(converter_error(device, one) for one in there)
         return _Drawn((report.error + noise / device.full_scale).astype(np.float32), report.right)
 
     def _place(self, i: int) -> tuple[int, int]:
@@ -197,7 +196,7 @@ class Expectation:
     def _drive_gain(self, i: int) -> float:
         return self._device.drive_per_volt(*self._place(i)) / self._device.epsilon_per_volt
 
-    def _worst(self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[ChainState]) -> int | None:
+    def _worst(self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> int | None:
         """Of the chains whose settings have a closed form, that with the largest expected error."""
         device = self._device
         if device.coupling.scope != "link" and device.chain_length > 1:
@@ -205,7 +204,7 @@ class Expectation:
         plain = [i for i in busy if states[i].epsilon and states[i].phase is None and not states[i].tones]
         return max(plain, key=lambda i: float(self._kept[(i, targets[i], 1.0)].error.mean()), default=None)
 
-    def _planned(self, i: int, target: ChainTarget, state: ChainState) -> TradePoint:
+    def _planned(self, i: int, target: ChainTarget, state: OperatingPoint) -> TradePoint:
         drawn = self._kept[(i, target, 1.0)]
         volts = abs(state.epsilon) / self._device.epsilon_max
         expected, median = float(drawn.error.mean()), float(np.median(drawn.error))
@@ -234,7 +233,7 @@ class Expectation:
         return tuple(points)
 
 
-def _toned(device: Device, state: ChainState, parts: Parts) -> _Drawn:
+def _toned(device: Device, state: OperatingPoint, parts: Parts) -> _Drawn:
     """One chain of several tones, each of which is to make its part of the amplitude."""
     flat = Parts(*(getattr(parts, field.name)[:, 0] for field in fields(Parts)))
     motion = march_tones(state, flat)
@@ -247,12 +246,12 @@ def _toned(device: Device, state: ChainState, parts: Parts) -> _Drawn:
     return _Drawn(error.astype(np.float32), right)
 
 
-def _wanted(target: ChainTarget, state: ChainState) -> Floats:
+def _wanted(target: ChainTarget, state: OperatingPoint) -> Floats:
     """The amplitudes wanted: those of the target, where a plan may aim beside them, else the state's."""
     return target.levels if isinstance(target, AmplitudeTarget) else state.target
 
 
-def _as_driven(state: ChainState, gain: float) -> ChainState:
+def _as_driven(state: OperatingPoint, gain: float) -> OperatingPoint:
     """A state whose drive is what its actuator makes of it."""
     if gain == 1.0:
         return state

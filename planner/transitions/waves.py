@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..margins import WELL_SHARE
-from ..plan import ChainState, Ramp, Tone, ToneRamp
+from ..operating_point import OperatingPoint
+from ..plan import Ramp, ToneRamp
 from ..waves.walking import TONES_GOOD
 from ..waves.wave_fit import GOOD
 from . import jets
@@ -19,7 +20,7 @@ from .fall import find_fall
 from .joining import as_tone
 from .limits import WayLimits
 from .rise import find_way
-from .slow import Sounding, slow_fall, slow_rise
+from .slow import slow_fall, slow_rise
 from .tones import quick_rise
 
 __all__ = ["BUDGET", "enter_wave", "leave_wave", "limits_of"]
@@ -32,7 +33,7 @@ BUDGET = 150
 PERIODS, SMOOTHNESS, NODES = 40, 5, 161
 
 
-def enter_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
+def enter_wave(device: Device, state: OperatingPoint, moves: bool) -> Ramp:
     """From rest to a wave; `moves` where lam may differ on the way from what it is in the end."""
     if device.chain_length == 1:
         return _single(device, state, rises=True)
@@ -45,20 +46,20 @@ def enter_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
         if not ramp.lacking:
             return ramp
         lacking = ramp.lacking
-    ramp = slow_rise(device, _sounding(state), TONES_GOOD if state.tones else GOOD)
+    ramp = slow_rise(device, state, TONES_GOOD if state.tones else GOOD)
     if state.tones and moves and device.coupling.closure is Closure.OPEN:
-        quick = quick_rise(device, _sounding(state), limits_of(device, moves), TONES_GOOD)
+        quick = quick_rise(device, state, limits_of(device, moves), TONES_GOOD)
         if quick is not None and (ramp.lacking or quick.duration_s < ramp.duration_s):
             return quick
     return ramp if not (ramp.lacking and lacking) else _lacking(ramp, lacking)
 
 
-def leave_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
+def leave_wave(device: Device, state: OperatingPoint, moves: bool) -> Ramp:
     """From a wave to rest, the drive among the ramp's tones."""
     if device.chain_length == 1:
         return as_tone(_single(device, state, rises=False), state.omega)
     if state.tones or device.coupling.closure is not Closure.OPEN:
-        return slow_fall(device, _sounding(state), moves)
+        return slow_fall(device, state, moves)
     ramp = find_fall(
         device.chain, epsilon=state.epsilon, lam=state.lam, omega=state.omega, phasor=state.phasor,
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
@@ -85,11 +86,7 @@ def limits_of(device: Device, moves: bool) -> WayLimits:
     )
 
 
-def _sounding(state: ChainState) -> Sounding:
-    return Sounding((Tone(state.omega, state.epsilon, state.phasor), *state.tones), state.lam, state.margins.multiplier)
-
-
-def _single(device: Device, state: ChainState, *, rises: bool) -> Ramp:
+def _single(device: Device, state: OperatingPoint, *, rises: bool) -> Ramp:
     """One actuator follows a smooth step times its motion; the drive is what the equation asks for on the way.
 
     A tone c s(tau) takes ``(1 - omega^2 + i delta omega) c s + (2 i omega + delta) c s' + c s''`` and, of the cubic
@@ -101,7 +98,7 @@ def _single(device: Device, state: ChainState, *, rises: bool) -> Ramp:
     if not rises:
         s0, s1, s2, s3 = 1 - s0, -s1, -s2, -s3
     tones = []
-    for tone in _sounding(state).tones:
+    for tone in state.every_tone:
         phasor = complex(tone.phasor[0])
         stage, drag = 1 - tone.omega**2 + 1j * device.delta * tone.omega, 2j * tone.omega + device.delta
         cubic = tone.epsilon - stage * phasor

@@ -12,7 +12,7 @@ from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain
 from ..margins import lacking_of, slew_of
-from ..plan import ChainState, Margins, Tone
+from ..operating_point import Margins, OperatingPoint, Tone
 from ..targets import WalkingTarget
 from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
 
@@ -30,7 +30,7 @@ HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
 NARROWEST = 1.01
 
 
-def walking_state(device: Device, target: WalkingTarget) -> ChainState:
+def walking_state(device: Device, target: WalkingTarget) -> OperatingPoint:
     """The settings for a wave of two tones of half the wanted amplitude; the nearest where they cannot be made."""
     level = float(target.levels.max())
     if np.ptp(target.levels[target.weights > 0]) > 0:
@@ -47,7 +47,7 @@ def walking_state(device: Device, target: WalkingTarget) -> ChainState:
     return replace(state, outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking)
 
 
-def walking_rate_hz(device: Device, state: ChainState) -> float:
+def walking_rate_hz(device: Device, state: OperatingPoint) -> float:
     """Bars that pass an actuator in a second in the state of a walk."""
     other = next(tone for tone in state.tones if not tone.side)
     return (other.omega - state.omega) * device.f0_hz
@@ -122,7 +122,7 @@ def _lacking(device: Device, target: WalkingTarget, found: TwoTones, share: floa
     return ""
 
 
-def _state(device: Device, target: WalkingTarget, found: TwoTones) -> ChainState:
+def _state(device: Device, target: WalkingTarget, found: TwoTones) -> OperatingPoint:
     n = device.chain_length
     lags = np.outer(found.lag, target.place + np.arange(n))
     phasors = found.phasor[:, None] * np.exp(-1j * lags)
@@ -139,7 +139,7 @@ def _state(device: Device, target: WalkingTarget, found: TwoTones) -> ChainState
     # The tones with all side tones in line, and the third harmonic that goes with them.
     highest = float(np.abs(found.phasor).sum())
     highest += abs(device.beta) * highest**3 / 32
-    return ChainState(
+    return OperatingPoint(
         target=target.levels,
         epsilon=first.epsilon,
         lam=lam,
@@ -159,10 +159,10 @@ def _state(device: Device, target: WalkingTarget, found: TwoTones) -> ChainState
     )
 
 
-def _nothing(device: Device, target: WalkingTarget, lacking: str) -> ChainState:
+def _nothing(device: Device, target: WalkingTarget, lacking: str) -> OperatingPoint:
     n = device.chain_length
     silence = np.zeros(n, dtype=np.complex128)
-    return ChainState(
+    return OperatingPoint(
         target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
         phasor=silence, mean=np.zeros(n), error=float(target.levels.max()), margins=Margins(0.0, 0.0),
         outcome=Outcome.UNREACHABLE, lacking=lacking,

@@ -13,7 +13,7 @@ from ..closed_forms.links import detuning_gain
 from ..closed_forms.nearest import nearest_geometric
 from ..closed_forms.wave_fit import Fitted
 from ..margins import converter_error, lacking_of, slew_of, well_of
-from ..plan import ChainState, Margins
+from ..operating_point import Margins, OperatingPoint
 from ..targets import WaveTarget
 from .wave_fit import GOOD, WaveFit
 
@@ -28,7 +28,7 @@ ROUNDING = 2.0
 UNEVEN = 0.1
 
 
-def wave_state(device: Device, target: WaveTarget) -> ChainState:
+def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
     """The settings for a wave, or for amplitudes that one lam can make.
 
     Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
@@ -51,21 +51,21 @@ class _Told:
     found: Fitted
     share: float
 
-    def state(self) -> ChainState:
+    def state(self) -> OperatingPoint:
         """The state."""
-        task, device, hold = self.task, self.task.device, self.found.hold
+        task, device, point = self.task, self.task.device, self.found.point
         n, known = device.chain_length, bool(np.isfinite(self.found.error))
         phasor = self.found.phasor if known else np.zeros(n, dtype=np.complex128)
-        noise = converter_error(device, hold) if known else 0.0
+        noise = converter_error(device, point) if known else 0.0
         error = task.wanted(1.0).error(phasor) + noise
         margins = self._margins() if known else Margins(0.0, 0.0)
         lacking = self._lacking(error, noise) or lacking_of(margins)
-        return ChainState(
+        return OperatingPoint(
             target=task.target.levels,
-            epsilon=hold.epsilon,
-            lam=hold.lam,
+            epsilon=point.epsilon,
+            lam=point.lam,
             bias=np.zeros(n),
-            omega=hold.omega,
+            omega=point.omega,
             phasor=phasor,
             mean=np.zeros(n),
             error=error / device.full_scale,
@@ -76,13 +76,13 @@ class _Told:
         )
 
     def _margins(self) -> Margins:
-        device, hold, found = self.task.device, self.found.hold, self.found
-        gain = detuning_gain(device.chain, np.abs(found.phasor)[None, :], hold.lam[None, :], hold.omega)
+        device, point, found = self.task.device, self.found.point, self.found
+        gain = detuning_gain(device.chain, np.abs(found.phasor)[None, :], point.lam[None, :], point.omega)
         return Margins(
-            volts=abs(hold.epsilon) / device.epsilon_max,
+            volts=abs(point.epsilon) / device.epsilon_max,
             well=well_of(device, found.response),
             noise_gain=float(gain[0]),
-            slew=slew_of(device, abs(hold.epsilon), hold.omega),
+            slew=slew_of(device, abs(point.epsilon), point.omega),
             multiplier=float(np.nan_to_num(np.abs(found.response.multipliers)).max()),
         )
 
@@ -112,18 +112,18 @@ class _Told:
         return bool(np.abs(near.first * near.ratio ** np.arange(len(levels)) - levels).max() > UNEVEN)
 
     def _out_of_range(self) -> str:
-        hold, lam, omega = self.found.hold, self.task.device.coupling.lam, self.task.device.omega
+        point, lam, omega = self.found.point, self.task.device.coupling.lam, self.task.device.omega
         # Zero is a link that passes nothing on, which may be wanted; nothing lies below it.
-        low = lam.min > 0 and bool(np.any(hold.lam <= lam.min))
-        if self.task.freedom.lam and (low or np.any(hold.lam >= lam.max)):
+        low = lam.min > 0 and bool(np.any(point.lam <= lam.min))
+        if self.task.freedom.lam and (low or np.any(point.lam >= lam.max)):
             return f"it takes a lam {'below' if low else 'above'} {lam.min:.3g}..{lam.max:.3g}; it lacks range of lam"
-        if not omega.min < hold.omega < omega.max:
+        if not omega.min < point.omega < omega.max:
             return f"it takes a frequency outside {omega.min:g}..{omega.max:g}; it lacks range of omega"
         return ""
 
     def _no_freedom(self) -> str:
         device = self.task.device
-        rounding = device.chain_length * device.coupling.lam_step / max(float(self.found.hold.lam.max()), 1e-9) / 2
+        rounding = device.chain_length * device.coupling.lam_step / max(float(self.found.point.lam.max()), 1e-9) / 2
         if self.found.error < ROUNDING * rounding * self.task.scale:
             return f"lam can only be set in steps of {device.coupling.lam_step:.2g}; it lacks bits of lam"
         shape = "ring" if device.coupling.closure is Closure.RING else "chain"
