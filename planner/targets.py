@@ -34,6 +34,14 @@ class ChainTarget:
     amplitude: tuple[float, ...]
     turn: float = field(default=0.0, kw_only=True)
 
+    def __post_init__(self) -> None:
+        # Once: a target is looked up several times in every frame. What else it has is left to ==.
+        object.__setattr__(self, "_hash", hash((self.amplitude, self.turn)))
+
+    def __hash__(self) -> int:
+        number: int = self.__dict__["_hash"]
+        return number
+
     @cached_property
     def levels(self) -> Floats:
         """The amplitudes as float64, shape (n,), read-only."""
@@ -67,6 +75,8 @@ class ChainTarget:
 class AmplitudeTarget(ChainTarget):
     """Amplitudes, or deflections; any phases will do. All zero is rest."""
 
+    __hash__ = ChainTarget.__hash__
+
     @classmethod
     def of(cls, levels: Floats, turn: float = 0.0) -> AmplitudeTarget:
         """Of amplitudes in an array of shape (n,)."""
@@ -86,6 +96,8 @@ class WaveTarget(ChainTarget):
     phase: tuple[float | None, ...]
     weight: tuple[float, ...]
     lam: float | None = None
+
+    __hash__ = ChainTarget.__hash__
 
     @classmethod
     def of(cls, levels: Floats, phases: Floats, weights: Floats, turn: float = 0.0) -> WaveTarget:
@@ -131,7 +143,10 @@ class WalkingTarget(ChainTarget):
     place: int = 0
     lam: float | None = None
 
+    __hash__ = ChainTarget.__hash__
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.width is None and self.rate_hz is None:
             raise ValueError("walking bars: expected a width, a rate or both")
 
@@ -159,14 +174,18 @@ def targets_of(pattern: TargetPattern, device: Device) -> Iterator[ChainTarget]:
     matters = np.full(size.shape, pattern.phase_matters) & (size > 0) & (weight > 0)
     if pattern.any_phase is not None:
         matters &= ~pattern.any_phase
-    chains = (part.reshape(-1, n) for part in (size, np.where(matters, angle, np.nan), weight))
-    for number, (levels, phases, weights) in enumerate(zip(*chains, strict=True)):
+    sizes, phases, weights = (part.reshape(-1, n) for part in (size, np.where(matters, angle, np.nan), weight))
+    if pattern.walking is None and not matters.any():
+        heeded = sizes if np.all(weights > 0) else sizes * (weights > 0)
+        yield from (AmplitudeTarget(tuple(levels)) for levels in heeded.tolist())
+        return
+    for number, (levels, phase, heed) in enumerate(zip(sizes, phases, weights, strict=True)):
         if pattern.walking is not None and np.any(levels):
             place, walking = number % device.chains_per_row * n, pattern.walking
             width, rate_hz = (None if np.isnan(one) else float(one) for one in (walking.width, walking.rate_hz))
-            yield WalkingTarget(tuple(levels.tolist()), tuple(weights.tolist()), width, rate_hz, place)
+            yield WalkingTarget(tuple(levels.tolist()), tuple(heed.tolist()), width, rate_hz, place)
         else:
-            yield _standing(levels, phases, weights)
+            yield _standing(levels, phase, heed)
 
 
 def _standing(levels: Floats, phases: Floats, weights: Floats) -> ChainTarget:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +11,12 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import TargetPattern
 
-from .chains import MOST_STATES, Chains
-from .families import strategy_for
+from .memory import MOST_STATES, Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
-from .strategy import Strategy
 from .targets import ChainTarget, targets_of
 
-__all__ = ["UnequalChains"]
+__all__ = ["UnequalMemory"]
 
 Floats = NDArray[np.float64]
 
@@ -29,11 +26,10 @@ SLACK = 1e-9
 TOLD = 5e-4
 
 
-class UnequalChains(Chains):
-    """As `Chains`, with the numbers of each chain; chains of the same numbers are one kind, planned once."""
+class UnequalMemory(Memory):
+    """As `Memory`, with the numbers of each chain; chains of the same numbers are one kind, planned once."""
 
     def __init__(self, device: Device, contrast_db: float) -> None:
-        super().__init__(device, contrast_db)
         self._alone: list[Device] = []
         self._units: list[Floats | float] = []
         self._kind_at: list[int] = []
@@ -47,21 +43,17 @@ class UnequalChains(Chains):
                     own = device.coupling.scope == "link"
                     self._units.append(device.lam_gain(row, index) if own else device.lam_unit(row, index))
                 self._kind_at.append(kind)
-        self._chains = [Chains(alone, contrast_db, self) for alone in self._alone]
+        super().__init__(device, contrast_db, self._alone)
+        self._of_kind = [Memory(alone, contrast_db, whole=self) for alone in self._alone]
         self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
         self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
-
-    @cached_property
-    def strategy(self) -> Strategy | None:
-        """The way to make amplitudes at will, with what all kinds of chain have in common."""
-        return strategy_for(self.device, self._contrast_db, self._alone)
 
     def hold(self, pattern: TargetPattern, before: Sequence[ChainTarget]) -> list[ChainTarget]:
         """What chains hold for a pattern, given what they held."""
         wanted = zip(self._kind_at, targets_of(pattern, self.device), before, strict=True)
-        targets = [self._chains[kind].held(target, one) for kind, target, one in wanted]
-        for kind, chains in enumerate(self._chains):
-            chains.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
+        targets = [self._of_kind[kind].held(target, one) for kind, target, one in wanted]
+        for kind, memory in enumerate(self._of_kind):
+            memory.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
         return targets
 
     def states(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
@@ -72,7 +64,7 @@ class UnequalChains(Chains):
         if (kind, target) not in self._set:
             if len(self._set) >= MOST_STATES:
                 self._set.clear()
-            self._set[(kind, target)] = self._state(kind, self._chains[kind].state(target))
+            self._set[(kind, target)] = self._state(kind, self._of_kind[kind].state(target))
         return self._set[(kind, target)]
 
     def _state(self, kind: int, state: OperatingPoint) -> OperatingPoint:
@@ -123,7 +115,7 @@ class UnequalChains(Chains):
     def leaving_s(self, targets: Sequence[ChainTarget], moves: bool) -> float:
         """Seconds until all chains have come to rest."""
         return max(
-            (self._chains[kind].leaving_s([one], moves) for kind, one in zip(self._kind_at, targets, strict=True)),
+            (self._of_kind[kind].leaving_s([one], moves) for kind, one in zip(self._kind_at, targets, strict=True)),
             default=0.0,
         )
 
@@ -132,9 +124,9 @@ class UnequalChains(Chains):
     ) -> list[Ramp | None]:
         """The ways from one to the other, as the device is set on them; None where a chain already stands."""
         pairs = list(zip(self._kind_at, before, after, strict=True))
-        for kind, chains in enumerate(self._chains):
+        for kind, memory in enumerate(self._of_kind):
             same = [(one, other) for at, one, other in pairs if at == kind]
-            chains.prepare_ramps(same, moves)
+            memory.prepare_ramps(same, moves)
         return [self._set_ramp(kind, one, other, moves, wait_s) for kind, one, other in pairs]
 
     def _set_ramp(self, kind: int, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float) -> Ramp | None:
@@ -142,11 +134,11 @@ class UnequalChains(Chains):
         if ask not in self._set_ramps:
             if len(self._set_ramps) >= MOST_STATES:
                 self._set_ramps.clear()
-            ramp = self._chains[kind].ramp(before, after, moves, wait_s)
-            self._set_ramps[ask] = None if ramp is None else self._ramp(kind, ramp)
+            ramp = self._of_kind[kind].ramp(before, after, moves, wait_s)
+            self._set_ramps[ask] = None if ramp is None else self._as_set(kind, ramp)
         return self._set_ramps[ask]
 
-    def _ramp(self, kind: int, ramp: Ramp) -> Ramp:
+    def _as_set(self, kind: int, ramp: Ramp) -> Ramp:
         gain, span = self._drive(kind), self.device.coupling.lam
         tones = tuple(
             replace(

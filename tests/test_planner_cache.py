@@ -24,7 +24,7 @@ from planner import FramePlan, OperatingPoint, Ramp, plan_scene
 from planner.amplitudes.deflection import Deflection
 from planner.amplitudes.vibration import Vibration
 from planner.cache import PlanCache, cache_path
-from planner.strategy import Strategy
+from planner.family import AmplitudeFamily
 
 ROOT = Path(__file__).resolve().parent.parent
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")
@@ -43,16 +43,18 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """How many states and ramps were computed so far."""
     done = {"states": 0, "ramps": 0}
 
-    def counting(kind: type[Strategy]) -> None:
+    def counting(kind: type[AmplitudeFamily]) -> None:
         plain_states, plain_ramps = kind.states, kind.ramps
 
-        def states(self: Strategy, targets: NDArray[np.float64]) -> list[OperatingPoint]:
+        def states(self: AmplitudeFamily, targets: NDArray[np.float64]) -> list[OperatingPoint]:
             done["states"] += len(targets)
             return plain_states(self, targets)
 
-        def ramps(self: Strategy, before: list[OperatingPoint], after: list[OperatingPoint]) -> list[Ramp | None]:
+        def ramps(
+            self: AmplitudeFamily, before: list[OperatingPoint], after: list[OperatingPoint], moves: bool
+        ) -> list[Ramp | None]:
             done["ramps"] += len(after)
-            return plain_ramps(self, before, after)
+            return plain_ramps(self, before, after, moves)
 
         monkeypatch.setattr(kind, "states", states)
         monkeypatch.setattr(kind, "ramps", ramps)

@@ -16,8 +16,8 @@ from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import FramePlan, Plan, plan_scene
 from planner.amplitudes.band import choose_band
 from planner.amplitudes.vibration import Vibration
-from planner.chains import Chains
 from planner.closed_forms.links import drive_for, links_for
+from planner.memory import Memory
 from planner.operating_point import OperatingPoint
 from planner.outlook import FrameSpread
 from planner.robustness import expected as expected_module
@@ -85,8 +85,8 @@ def test_a_frame_is_as_good_as_its_rows_drawn_together() -> None:
     """Row by row and kept, or all at once: the same draws, the same answer."""
     device = spread(LINKED)
     frame = planned(device, DOTS)[0]
-    chains = Chains(device, 20.0)
-    held = chains.hold(TargetPattern(DOTS.astype(np.complex128)), chains.at_rest)
+    memory = Memory(device, 20.0)
+    held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
     there = [replace(state, target=one.levels) for one, state in zip(held, frame.states, strict=True)]
     motion = motion_of(there, drawn_in(device, Spread(f0=0.01), range(6), count=1000, seed=0))
     report = judge(wish_of(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
@@ -104,9 +104,9 @@ def test_known_rows_are_not_judged_again(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(expected_module, "drawn_in", counting)
     device = spread(PAPER)
-    chains, expectation = Chains(device, 20.0), Expectation(device)
-    held = chains.hold(TargetPattern(DOTS.astype(np.complex128)), chains.at_rest)
-    states = chains.states(held)
+    memory, expectation = Memory(device, 20.0), Expectation(device)
+    held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
+    states = memory.states(held)
     first = expectation.of(held, states)
     busy = sum(bool(state.bias.any()) for state in states)
     assert counted == busy
@@ -127,9 +127,9 @@ def test_the_accuracy_needed_is_enough_and_twice_of_it_is_not() -> None:
 def test_a_wave_over_weak_links_is_told_what_it_needs() -> None:
     wave = 0.1 * np.exp(-0.5j * np.pi * np.arange(6))[None].repeat(6, axis=0)
     device = spread(PAPER, 0.01)
-    chains = Chains(device, 20.0)
-    held = chains.hold(TargetPattern(wave, phase_matters=True), chains.at_rest)
-    states = chains.states(held)
+    memory = Memory(device, 20.0)
+    held = memory.hold(TargetPattern(wave, phase_matters=True), memory.at_rest)
+    states = memory.states(held)
     assert all(state.outcome is Outcome.OK for state in states)
     found = Expectation(device).of(held, states)
     assert found is not None

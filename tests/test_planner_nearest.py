@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
 from planner.closed_forms.nearest import nearest_geometric
-from planner.families import strategy_for
-from planner.targets import WaveTarget
+from planner.families import row_of
+from planner.targets import AmplitudeTarget, WaveTarget
 from planner.waves.wave_state import wave_state
 
 RING = load_device("paper-6x6-ring")
@@ -52,9 +52,9 @@ def test_the_nearest_is_the_best_there_is(device: Device, target: tuple[float, .
     assert np.all(near <= 1 + 1e-12)
 
 
-def test_such_devices_have_no_strategy_for_patterns_at_will() -> None:
-    assert strategy_for(RING, 20.0) is None
-    assert strategy_for(OPEN, 20.0) is None
+def test_such_devices_make_waves_of_amplitudes() -> None:
+    assert row_of(AmplitudeTarget, RING).name == "wave"
+    assert row_of(AmplitudeTarget, OPEN).name == "wave"
 
 
 @devices

@@ -18,6 +18,7 @@ from planner.analysis.pareto_point import ALIKE, RESOLUTION, ParetoError, Pareto
 from planner.analysis.pareto_still import PERIODS, ways_of_deflections
 from planner.targets import targets_of
 from planner.transitions.waves import enter_wave
+from planner.waves.wave_fit import GOOD
 from planner.waves.wave_state import wave_state
 
 SHAPE = GridShape(6, 6)
@@ -174,7 +175,7 @@ def test_waves_trade_time_against_drive():
         assert fast.ramp_s < slow.ramp_s
         assert fast.drive > slow.drive
     target = next(iter(targets_of(pattern, device)))
-    planned = enter_wave(device, wave_state(device, target), True)
+    planned = enter_wave(device, wave_state(device, target), True, GOOD)
     assert found.points[0].ramp_s == planned.duration_s
     assert found.points[0].drive == pytest.approx(np.abs(planned.epsilon).max() / device.epsilon_max)
     assert all(point.error <= 2e-3 for point in found.points)

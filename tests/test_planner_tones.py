@@ -14,7 +14,7 @@ from drivers import Waveform, WaveformError, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, walking_bars
 from planner import ContrastError, FramePlan, Margins, OperatingPoint, Plan, Ramp, Tone, ToneRamp, plan_scene
 from planner.cache import PlanCache
-from planner.chains import MOST_STATES, Chains
+from planner.memory import MOST_STATES, Memory
 from planner.transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
 
 SINGLE = load_device("independent-6x6")
@@ -151,20 +151,20 @@ def test_a_contrast_that_is_none_is_refused(contrast_db: float) -> None:
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.chains.MOST_STATES", 8)
-    monkeypatch.setattr("planner.chains.MOST_RAMPS", 8)
-    chains, rng = Chains(SINGLE, 20.0), np.random.default_rng(0)
-    held = [chains.rest] * 36
+    monkeypatch.setattr("planner.memory.MOST_STATES", 8)
+    monkeypatch.setattr("planner.memory.MOST_RAMPS", 8)
+    memory, rng = Memory(SINGLE, 20.0), np.random.default_rng(0)
+    held = [memory.rest] * 36
     for _ in range(5):
-        now = chains.hold(TargetPattern(rng.uniform(0.1, 1, (6, 6)).astype(np.complex128)), held)
+        now = memory.hold(TargetPattern(rng.uniform(0.1, 1, (6, 6)).astype(np.complex128)), held)
         for one, other in zip(held, now, strict=True):
-            chains.state(other)
-            chains.ramp(one, other, True)
+            memory.state(other)
+            memory.ramp(one, other, True)
         held = now
-        assert len(chains._turned) <= 8
-        assert len(chains._turned_ramps) <= 8
-        assert len(chains._targets) <= 8
-        assert len(chains._states) <= 8 + 36
+        assert len(memory._states) <= 8
+        assert len(memory._turned) <= 8
+        assert len(memory._held) <= 8
+        assert len(memory._points) <= 8 + 36
     assert MOST_STATES >= 64
 
 

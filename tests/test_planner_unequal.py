@@ -16,9 +16,9 @@ from planner import plan_scene
 from planner.amplitudes import vibration as vibration_module
 from planner.amplitudes.refine import refine
 from planner.cache import PlanCache
-from planner.chains import Chains
+from planner.memory import Memory
 from planner.operating_point import OperatingPoint
-from planner.unequal import UnequalChains
+from planner.unequal import UnequalMemory
 
 Floats = NDArray[np.float64]
 
@@ -67,15 +67,15 @@ def truth(device: Device, place: int, state: OperatingPoint) -> NDArray[np.compl
 
 
 def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[OperatingPoint]:
-    chains = UnequalChains(device, 20.0)
+    memory = UnequalMemory(device, 20.0)
     target = TargetPattern(np.asarray(pattern, dtype=np.complex128), phase_matters=phase_matters)
-    return chains.states(chains.hold(target, chains.at_rest))
+    return memory.states(memory.hold(target, memory.at_rest))
 
 
 @pytest.mark.parametrize("base", [LINKED, PAPER, SINGLE], ids=lambda device: device.name)
 def test_every_chain_holds_its_target_as_it_really_is(base: Device) -> None:
     device = measured(base, 0.01, gain=0.03)
-    blind = Chains(base, 20.0)
+    blind = Memory(base, 20.0)
     nominal = blind.states(blind.hold(TargetPattern(DOTS.astype(np.complex128)), blind.at_rest))
     for place, (state, other) in enumerate(zip(held(device, DOTS), nominal, strict=True)):
         assert state.outcome is Outcome.OK

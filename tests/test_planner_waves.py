@@ -17,6 +17,7 @@ from planner.margins import converter_error
 from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.two_tones import MAIN, ORDERS, two_tones
+from planner.waves.wave_fit import GOOD
 from planner.waves.wave_forms import lag_and_ratio, wave_for, wave_on
 from planner.waves.wave_state import wave_state
 
@@ -241,7 +242,7 @@ def test_two_tones_stand_in_every_stage(amplitude: float, width: float) -> None:
 
 def test_ways_of_waves_and_tones_end_where_they_should() -> None:
     state = wave(PAPER, 90)
-    into, out = enter_wave(PAPER, state, True), leave_wave(PAPER, state, True)
+    into, out = enter_wave(PAPER, state, True, GOOD), leave_wave(PAPER, state, True)
     assert into.lacking == "" == out.lacking
     assert into.duration_s < 0.5
     assert into.epsilon is not None

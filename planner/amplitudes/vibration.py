@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain, links_for
+from ..family import AmplitudeFamily, PatternFamily
 from ..margins import WELL_SHARE, converter_error, lacking_of, slew_of
 from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
-from ..strategy import Strategy
 from ..transitions import jets
 from ..transitions.envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
 from ..transitions.hermite import broken_line
@@ -37,16 +38,23 @@ FINE_PIECE_S = 1.5e-3
 DELICATE = 1e6
 
 
-class Vibration(Strategy):
+class Vibration(AmplitudeFamily):
     """Amplitude profiles by closed-form links, refined on harmonic balance; flat ramps between them."""
 
     def __init__(
         self, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: Vibration | None = None
     ) -> None:
-        """`kinds`, `whole` : as in `strategy_for`; all chains of a device share one band."""
+        """`kinds`, `whole` : as in `families.family_of`; all chains of a device share one band."""
         super().__init__(device)
         self.contrast_db = contrast_db
         self._kinds, self._whole = kinds, whole
+
+    @classmethod
+    def of(
+        cls, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: PatternFamily | None = None
+    ) -> Self:
+        """The family on a device, or on one chain of the device that `whole` is for."""
+        return cls(device, contrast_db, kinds, whole if isinstance(whole, Vibration) else None)
 
     @cached_property
     def band(self) -> Band:
@@ -58,7 +66,7 @@ class Vibration(Strategy):
         """Length of the longest ramps in seconds."""
         return self.band.ramp_s
 
-    def held(self, target: Floats, started: bool) -> Floats:
+    def levels(self, target: Floats, started: bool) -> Floats:
         """A chain rests until its first dot; after it, unraised dots idle near the floor, for fast changes.
 
         Each takes the floor or half of it, whichever mix magnifies disturbances of the drive least: equal
@@ -172,7 +180,9 @@ class Vibration(Strategy):
             lam = lam / device.lam_gain(0)
         return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
 
-    def ramps(self, before: list[OperatingPoint], after: list[OperatingPoint]) -> list[Ramp | None]:
+    def ramps(
+        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+    ) -> list[Ramp | None]:
         """From rest and to rest along the flat output; between patterns with links that vary in time."""
         chain, band = self.device.chain, self.band
         old = np.array([_standing(state) for state in before]) * self.device.full_scale
@@ -188,7 +198,7 @@ class Vibration(Strategy):
             if len(index):
                 duration = ramp_s * self.device.tau_per_s
                 made = way(chain, *(end[index] for end in ends), band.omega, duration, NODES_PER_RAMP)
-                ramps = self._ramps(made, ramp_s, [before[i] for i in index], [after[i] for i in index])
+                ramps = self._ramps(made, ramp_s, [before[int(i)] for i in index], [after[int(i)] for i in index])
                 for i, ramp in zip(index, ramps, strict=True):
                     out[i] = ramp
 
@@ -198,7 +208,7 @@ class Vibration(Strategy):
         return out
 
     def _ramps(
-        self, made: EnvelopeRamp, ramp_s: float, before: list[OperatingPoint], after: list[OperatingPoint]
+        self, made: EnvelopeRamp, ramp_s: float, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint]
     ) -> list[Ramp]:
         """Ramps moved by the little that separates their closed-form ends from the refined states."""
         blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)
@@ -225,7 +235,7 @@ class Vibration(Strategy):
         ]
 
     def _courses(
-        self, made: EnvelopeRamp, ramp_s: float, before: list[OperatingPoint], after: list[OperatingPoint]
+        self, made: EnvelopeRamp, ramp_s: float, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint]
     ) -> list[Floats]:
         """What the links of every ramp do in straight pieces; float64, shape (pieces + 1, n-1) each."""
         blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)[0]

@@ -35,9 +35,9 @@ def ways_of_deflections(wishes: Floats, device: Device) -> tuple[list[ParetoPoin
     ----------
     wishes : float64, shape (P, n), in units of full scale.
     """
-    strategy = Deflection(device)
-    rest = strategy.states(np.zeros_like(wishes))
-    states = strategy.states(wishes)
+    family = Deflection(device)
+    rest = family.states(np.zeros_like(wishes))
+    states = family.states(wishes)
     if any(state.outcome is not Outcome.OK for state in states):
         return [], len(PERIODS)
     still = max(_scatter(device, state) for state in states)

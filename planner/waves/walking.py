@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +12,16 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain
+from ..family import RisingFamily
 from ..margins import lacking_of, slew_of
 from ..operating_point import Margins, OperatingPoint, Tone
-from ..targets import WalkingTarget
+from ..plan import Ramp
+from ..targets import ChainTarget, WalkingTarget
+from ..transitions.slow import slow_fall
+from ..transitions.waves import enter_tones
 from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
 
-__all__ = ["TONES_GOOD", "walking_rate_hz", "walking_state"]
+__all__ = ["TONES_GOOD", "Walking", "walking_rate_hz", "walking_state"]
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +33,22 @@ SIDE = [k not in (MAIN, MAIN + 1) for k in range(len(ORDERS))]
 HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
 # Bars narrower than this have tones at lags of nearly 0 and 180 degrees, beyond any lam.
 NARROWEST = 1.01
+
+
+class Walking(RisingFamily):
+    """Two tones under one lam."""
+
+    def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """One by one."""
+        return [walking_state(self.device, target) for target in targets if isinstance(target, WalkingTarget)]
+
+    def enter(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The slow way, or over strong links."""
+        return enter_tones(self.device, point, moves, TONES_GOOD)
+
+    def leave(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The drive is taken away."""
+        return slow_fall(self.device, point, moves)
 
 
 def walking_state(device: Device, target: WalkingTarget) -> OperatingPoint:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,15 @@ from chainsim import Closure, Device, Outcome
 from ..closed_forms.links import detuning_gain
 from ..closed_forms.nearest import nearest_geometric
 from ..closed_forms.wave_fit import Fitted
+from ..family import RisingFamily
 from ..margins import converter_error, lacking_of, slew_of, well_of
 from ..operating_point import Margins, OperatingPoint
-from ..targets import WaveTarget
+from ..plan import Ramp
+from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
+from ..transitions.waves import enter_wave, leave_wave
 from .wave_fit import GOOD, WaveFit
 
-__all__ = ["wave_state"]
+__all__ = ["Waves", "wave_state"]
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +30,40 @@ Floats = NDArray[np.float64]
 ROUNDING = 2.0
 # Amplitudes this far (of full scale) from every geometric row are out of reach by their shape, whatever else is.
 UNEVEN = 0.1
+
+
+class Waves(RisingFamily):
+    """Waves of one tone, and amplitudes where the device has no better way: the nearest that one lam can make."""
+
+    def held(self, target: ChainTarget, started: bool) -> ChainTarget:
+        """Amplitudes are a wave of any phases, unless they are rest."""
+        if not isinstance(target, AmplitudeTarget) or target.resting:
+            return target
+        n = len(target.amplitude)
+        return WaveTarget(target.amplitude, phase=(None,) * n, weight=(1.0,) * n)
+
+    def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """One by one."""
+        return [self._point(target) for target in targets]
+
+    def _point(self, target: ChainTarget) -> OperatingPoint:
+        return wave_state(self.device, target) if isinstance(target, WaveTarget) else _rest(self.device, target)
+
+    def enter(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The quickest way that is found."""
+        return enter_wave(self.device, point, moves, GOOD)
+
+    def leave(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The quickest way that is found."""
+        return leave_wave(self.device, point, moves)
+
+
+def _rest(device: Device, target: ChainTarget) -> OperatingPoint:
+    n = device.chain_length
+    return OperatingPoint(
+        target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
+        phasor=np.zeros(n, dtype=np.complex128), mean=np.zeros(n),
+    )  # fmt: skip
 
 
 def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
