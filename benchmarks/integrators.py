@@ -171,7 +171,10 @@ def odeint() -> Iterator[Way]:
         with tempfile.TemporaryDirectory() as folder:
             made = Path(folder) / "flow.so"
             build = [compiler, *flags, "-shared", "-fPIC", f"-DLANES={lanes}", f"-DSTEPPER={stepper}"]
-            subprocess.run([*build, str(HERE / "odeint.cpp"), "-o", str(made)], check=True, capture_output=True)
+            call = [*build, str(HERE / "odeint.cpp"), "-o", str(made)]
+            done = subprocess.run(call, check=False, capture_output=True, text=True)
+            if done.returncode:
+                raise Missing(f"g++ failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
             library = ctypes.CDLL(str(made))
 
         def make(tolerance: float, rows: int, library: ctypes.CDLL = library) -> Flow:

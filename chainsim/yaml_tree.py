@@ -59,7 +59,11 @@ class _Loader(_Parsing):  # type: ignore[misc]
         if node.tag in _NUMBERS and len(node.value) > LONGEST_NUMBER:
             raise _complaint(f"a number of {len(node.value)} characters; write fewer", node)
         try:
-            return super().construct_object(node, deep)
+            value = super().construct_object(node, deep)
+            if isinstance(value, int):
+                # Whoever takes it for a float later must find one.
+                float(value)
+            return value
         except (ValueError, LookupError, ArithmeticError):
             raise _complaint(f"not a value of the kind {node.tag.removeprefix(_TAG)}; correct it", node) from None
 

@@ -43,5 +43,5 @@ def completed_devices(incomplete: str) -> list[str]:
     """Built-in profiles that begin with a word, else YAML files."""
     spec = find_spec("chainsim")
     folders = spec.submodule_search_locations if spec is not None else None
-    names = sorted(path.stem for folder in folders or () for path in Path(folder, "profiles").glob("*.yaml"))
+    names = sorted(path.stem for folder in folders or () for path in Path(folder, "model", "profiles").glob("*.yaml"))
     return [name for name in names if name.startswith(incomplete)] or completed_files(".yaml", ".yml")(incomplete)

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from .errors import AppError
 from .icon_work import Recipe, Record, Task, all_of_batch, code_digest
-from .workers import Gone, Made, Ready, Worker
+from .workers import Failed, Gone, Made, Ready, Worker
 
 __all__ = ["TASK_S", "ClusterPool", "LocalPool", "Pool", "Work"]
 
@@ -149,23 +149,29 @@ class LocalPool(Pool):
         answer = busy.worker.hear()
         if isinstance(answer, Ready):
             busy.ready = True
-        elif isinstance(answer, Made):
-            yield Ended((busy.answered(),), [answer.result])
+            return
+        batch = busy.batches.popleft()
+        if isinstance(answer, Made):
+            yield Ended(batch, list(answer.results))
+            return
+        results = answer.results if isinstance(answer, Failed) else ()
+        at = answer.at if isinstance(answer, Gone) else len(results)
+        if results:
+            yield Ended(batch[:at], list(results))
+        # What was done and not told by a process that has ended is done again.
+        self._again += filter(None, [batch[len(results) : at] + batch[at + 1 :]])
+        if isinstance(answer, Gone):
+            self._replace(busy)
+        if isinstance(answer, Gone) and answer.limited:
+            yield Ended(batch[at : at + 1], [_lost(batch[at], f"{answer.problem}; {SIMPLER}")])
         else:
-            suspect, *rest = busy.batches.popleft()
-            self._again += [tuple(rest)] if rest else []
-            if isinstance(answer, Gone):
-                self._replace(busy)
-            if isinstance(answer, Gone) and answer.limited:
-                yield Ended((suspect,), [_lost(suspect, f"{answer.problem}; {SIMPLER}")])
-            else:
-                yield Ended((suspect,), None, answer.problem)
+            yield Ended(batch[at : at + 1], None, answer.problem)
 
     def _replace(self, busy: _Busy) -> None:
         if not busy.ready:
             raise AppError("a process ended before it could begin to work; is there memory left? try fewer --workers")
         self._workers.remove(busy)
-        self._again += map(tuple, busy.batches)
+        self._again += busy.batches
 
     def _end(self) -> None:
         for busy in self._workers:
@@ -181,26 +187,22 @@ class LocalPool(Pool):
 
 @dataclass(eq=False)
 class _Busy:
-    """A worker with the tasks it was given and has not answered, batch by batch."""
+    """A worker with the batches it was given and has not answered."""
 
     worker: Worker
-    batches: deque[deque[Task]] = field(default_factory=deque)
+    batches: deque[tuple[Task, ...]] = field(default_factory=deque)
     ready: bool = False
 
     def give(self, work: Work, recipe: Recipe, batch: tuple[Task, ...]) -> None:
-        self.batches.append(deque(batch))
+        self.batches.append(batch)
         self.worker.give(work, recipe, batch)
-
-    def answered(self) -> Task:
-        """The task that was to be answered next; it is answered now."""
-        task = self.batches[0].popleft()
-        if not self.batches[0]:
-            self.batches.popleft()
-        return task
 
 
 class ClusterPool(Pool):
     """The workers of a dask.distributed scheduler; work of a lost worker goes to another one.
+
+    Dask cannot stop one task, so there is no limit of time for one: a worker that hangs is given up by the scheduler
+    after its ``worker-ttl``, a batch that ends workers after ``allowed-failures``; its tasks are then tried one by one.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from chainsim import load_device
 from drivers import naming
 from encoders import Frame, PictureOptions, TargetPattern
 
+from .errors import AppError
 from .extent import extent_of, go_on
 from .icon_journal import Journal
 from .icon_pool import ClusterPool, LocalPool, Pool
@@ -21,6 +23,9 @@ from .icon_sources import find_icons
 from .icon_work import Recipe, code_digest
 
 __all__ = ["IconOptions", "render_icons"]
+
+JOURNAL = "journal.jsonl"
+REPORTS = ("manifest.csv", "manifest.json", "contact.png", "index.html")
 
 
 def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None = None) -> IconsReport:
@@ -32,7 +37,8 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
     Raises
     ------
     AppError
-        When there are no pictures, no process can be started, or no scheduler answers.
+        When there are no pictures, `out` has files that dotwave did not make, no process can be started, or no
+        scheduler answers.
     ChainError, DriverError
         When the device cannot be used, or the disk refuses.
     """
@@ -49,12 +55,13 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
     if options.waveforms:
         blank = Frame(TargetPattern(np.zeros((device.rows, device.cols), np.complex128)), options.dwell_s)
         go_on(extent_of([blank], device, Path("icon.wav"), options.encoding, len(places)), out, yes=options.yes)
+    _check_own(out)
     with naming(out):
         out.mkdir(parents=True, exist_ok=True)
     pool: Pool = (
         ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers, options.icon_seconds)
     )
-    with Journal(out / "journal.jsonl") as journal:
+    with Journal(out / JOURNAL) as journal:
         run = IconRun(recipe, options, out, places, journal)
         try:
             with pool:
@@ -64,3 +71,12 @@ def render_icons(sources: Sequence[str], out: Path, options: IconOptions | None 
             raise
         report = run.report(complete=True, seconds=time.perf_counter() - began)
     return write_report(report, out, pictures=True)
+
+
+def _check_own(out: Path) -> None:
+    """A folder without a journal is not one of ours: what is in it is not replaced."""
+    if os.path.lexists(out / JOURNAL):
+        return
+    for name in (*REPORTS, "waveforms"):
+        if os.path.lexists(out / name):
+            raise AppError(f"{out}: has {name}, and no {JOURNAL} that says dotwave made it; give another folder")

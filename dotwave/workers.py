@@ -23,6 +23,7 @@ __all__ = ["Failed", "Gone", "Made", "Ready", "Worker", "end_with_parent"]
 # Times the limit of processor time that a piece may take by the clock: a busy machine is no reason to end it.
 PATIENCE = 10
 PR_SET_PDEATHSIG = 1
+MOST_MARKS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -32,22 +33,25 @@ class Ready:
 
 @dataclass(frozen=True)
 class Made:
-    """What came of the next piece of a batch."""
+    """What came of all pieces of a batch."""
 
-    result: Any
+    results: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The next piece raised an error; the pieces after it were not begun."""
+    """The piece after those with `results` raised an error; `begun` pieces were begun, those after it not."""
 
+    results: tuple[Any, ...]
+    begun: int
     problem: str
 
 
 @dataclass(frozen=True)
 class Gone:
-    """The process ended while it worked on the next piece; `limited` when it was ended for taking too long."""
+    """The process ended at piece `at` of a batch; `limited` when it was ended for taking too long."""
 
+    at: int
     problem: str
     limited: bool
 
@@ -75,7 +79,7 @@ def _end_after(sentinel: int) -> None:
 
 
 class Worker:
-    """A process that takes batches, one after another, and answers piece by piece.
+    """A process that takes batches, one after another, and says which piece it was at when it ends.
 
     Parameters
     ----------
@@ -91,14 +95,17 @@ class Worker:
     def __init__(self, seconds: float) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
+        # A byte for each piece that is begun: cheaper than a message, and there when the process has ended.
+        self._begun, marks = context.Pipe(duplex=False)
         self._seconds = seconds
-        self._process = context.Process(target=_serve, args=(theirs, seconds), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, marks, seconds), daemon=True)
         try:
             with _quiet_children():
                 self._process.start()
         except OSError as error:
             raise AppError(f"no process can be started: {error.strerror or error}; give fewer --workers") from None
         theirs.close()
+        marks.close()
 
     def give(self, work: Callable[[Any, Sequence[Any]], Iterable[Any]], given: object, pieces: Sequence[Any]) -> None:
         """Have ``work(given, pieces)`` done after what was given before; it must give a result for each in turn."""
@@ -112,22 +119,35 @@ class Worker:
             answer: Answer = self.pipe.recv()
         except (EOFError, OSError):
             return self._gone()
+        if isinstance(answer, Made | Failed):
+            self._taken(answer.begun if isinstance(answer, Failed) else len(answer.results))
         return answer
 
+    def _taken(self, most: int) -> int:
+        """Take up to so many marks; how many there were."""
+        count = 0
+        while count < most and (marks := os.read(self._begun.fileno(), most - count)):
+            count += len(marks)
+        return count
+
     def _gone(self) -> Gone:
+        self._process.kill()
+        self._process.join()
+        at = max(0, self._taken(MOST_MARKS) - 1)
         self.end()
         code = self._process.exitcode
         if code == -signal.SIGPROF:
-            return Gone(f"it took more than {self._seconds:g} s of processor time", True)
+            return Gone(at, f"it took more than {self._seconds:g} s of processor time", True)
         if code == -signal.SIGALRM:
-            return Gone(f"it did not end within {PATIENCE * self._seconds:g} s", True)
-        return Gone("the process that worked on it ended at once (out of memory?)", False)
+            return Gone(at, f"it did not end within {PATIENCE * self._seconds:g} s", True)
+        return Gone(at, "the process that worked on it ended at once (out of memory?)", False)
 
     def end(self) -> None:
         """End the process at once."""
         self._process.kill()
         self._process.join()
         self.pipe.close()
+        self._begun.close()
 
 
 @contextmanager
@@ -146,7 +166,7 @@ def _quiet_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _serve(pipe: Connection, seconds: float) -> None:
+def _serve(pipe: Connection, marks: Connection, seconds: float) -> None:
     """What a worker does."""
     end_with_parent()
     for number in (signal.SIGPROF, signal.SIGALRM):
@@ -157,8 +177,7 @@ def _serve(pipe: Connection, seconds: float) -> None:
     with suppress(OSError):
         pipe.send(Ready())
         while (batch := asked.get()) is not None:
-            for answer in _answers(batch, seconds):
-                pipe.send(answer)
+            pipe.send(_answer(batch, marks.fileno(), seconds))
 
 
 def _listen(pipe: Connection, asked: queue.SimpleQueue[bytes | None]) -> None:
@@ -169,22 +188,20 @@ def _listen(pipe: Connection, asked: queue.SimpleQueue[bytes | None]) -> None:
     asked.put(None)
 
 
-def _answers(batch: bytes, seconds: float) -> Iterator[Made | Failed]:
-    results: Iterator[Any] | None = None
-    left = 1
-    while left:
-        try:
-            if results is None:
-                work, given, pieces = pickle.loads(batch)
-                results, left = _lazily(work, given, pieces), len(pieces)
+def _answer(batch: bytes, marks: int, seconds: float) -> Made | Failed:
+    results: list[Any] = []
+    begun = 0
+    try:
+        work, given, pieces = pickle.loads(batch)
+        made = _lazily(work, given, pieces)
+        for _ in pieces:
+            begun += os.write(marks, b".")
             with _limited(seconds):
-                result = next(results)
-        except BaseException as error:
-            # The last net of this process: whatever it is, the one that asked is told.
-            yield Failed(f"{type(error).__name__}: {' '.join(str(error).split())}"[:300])
-            return
-        yield Made(result)
-        left -= 1
+                results.append(next(made))
+    except BaseException as error:
+        # The last net of this process: whatever it is, the one that asked is told.
+        return Failed(tuple(results), begun, f"{type(error).__name__}: {' '.join(str(error).split())}"[:300])
+    return Made(tuple(results))
 
 
 def _lazily(work: Callable[[Any, Sequence[Any]], Iterable[Any]], given: object, pieces: Sequence[Any]) -> Iterator[Any]:

@@ -207,6 +207,7 @@ def _complaint(path: Path, error: OSError) -> str:
         errno.EPERM: f"no permission in folder {folder}; choose another folder or change its permissions",
         errno.EROFS: f"folder {folder} is on a read-only file system; choose another folder",
         errno.ENOTDIR: f"{folder} is not a folder; choose another one",
+        errno.ELOOP: "this is a symbolic link; remove it, or give another name",
         errno.EEXIST: "there is a file of this name; choose another",
         errno.ENAMETOOLONG: "File name too long; shorten it",
         errno.EISDIR: "this is a folder; give the name of a file",

@@ -265,8 +265,8 @@ def test_preload_and_bias_shift_the_rest():
 
 
 def test_no_compiler_is_imported_before_an_integration():
-    names = "slow.envelope, slow.envelope_rung, stability.continuation, stability.locking, stability.spectrum"
-    names += ", terms.terms, terms.terms_tones"
+    names = "averaging.envelope, averaging.rung, continuation.continuation, continuation.locking, continuation.spectrum"
+    names += ", effects.effects, effects.tones"
     loads = "; ".join(f"import chainsim.{name}" for name in names.split(", "))
     code = f"import sys; {loads}; print({{'numba', 'scipy', 'matplotlib'}} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"

@@ -107,7 +107,8 @@ def test_names_in_jobs_that_none_can_have(tmp_path: Path, dotwave, item: str, na
     job.write_text(f"device: paper-6x6\nsequence:\n  - {item.replace('NAME', name)}\n", encoding="utf-8")
     ended = dotwave("render", job)
     assert (ended.code, ended.out, ended.err.count("\n")) == (2, "", 1)
-    assert f"job.yaml:{NAMES[item]}" in ended.err
+    # Half a character is none: the parser of YAML stops there.
+    assert f"job.yaml:{NAMES[item] if 'ud800' not in name else '3: not YAML'}" in ended.err
     assert len(ended.err) < 600
 
 

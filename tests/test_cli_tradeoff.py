@@ -109,7 +109,7 @@ def test_complaints(job, tmp_path):
     with pytest.raises(AppError, match=r"expected a picture name that ends with .png or .svg"):
         run("pareto", job, "--picture", tmp_path / "ways.gif")
     (tmp_path / "file").write_text("")
-    with pytest.raises(FileError, match="file: there is a file of this name; choose another"):
+    with pytest.raises(FileError, match="file is not a folder; choose another one"):
         run("pareto", job, "--picture", tmp_path / "file" / "ways.png")
     with pytest.raises(AppError, match="no frame 7"):
         run("pareto", job, "--frame", "7")

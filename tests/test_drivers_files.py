@@ -294,7 +294,7 @@ def test_whenever_it_is_killed_the_pair_is_the_old_or_the_new(tmp_path: Path, be
         halves += (raw.get("x.wav") == new["x.wav"]) != (raw.get("x.json") == new["x.json"])
         if before or "x.json" in raw or any(name.endswith(".ready") for name in raw):
             # The old pair may have no x.wav.
-            with suppress(UnreadableWaveform):
+            with suppress(UnreadableWaveform, FileError):
                 read_waveform(folder / path)
             manifest, reader = read_waveform(folder / "x.json")
             manifest.check_digest(reader.path)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -64,10 +65,12 @@ def records(out: Path) -> list[dict[str, Any]]:
 
 
 def test_a_full_disk_is_one_line_and_the_next_run_goes_on(
-    dotwave: Callable[..., Any], folder: Path, disk: Callable[[str], Path]
+    dotwave: Callable[..., Any], folder: Path, disk: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = disk("5m") / "out"
     call = ("icons", folder, "-o", out, "--waveforms", "--workers", 1)
+    # There was room when it was looked at; others fill the disk meanwhile.
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1e12))
     ended = dotwave(*call)
     assert ended.code == 2
     assert ended.err.count("\n") == 1
@@ -131,10 +134,16 @@ def test_outputs_that_take_nothing(dotwave: Callable[..., Any], folder: Path, tm
     ended = dotwave("icons", folder, "-o", out)
     assert ended.code == 2
     assert ended.err.count("\n") == 1
-    assert "journal.jsonl: not a plain file" in ended.err
+    assert "journal.jsonl: this is a symbolic link; remove it" in ended.err
     (out / "journal.jsonl").unlink()
+    assert dotwave("icons", folder, "-o", out, "--workers", 1).code == 0
     for name in ("manifest.csv", "manifest.json", "contact.png", "index.html"):
+        (out / name).unlink()
         (out / name).symlink_to("/dev/full")
+        ended = dotwave("icons", folder, "-o", out, "--workers", 1)
+        assert (ended.code, ended.err.count("\n")) == (2, 1)
+        assert f"{name}: this is a device or a pipe; give the name of a file" in ended.err
+        (out / name).unlink()
     assert dotwave("icons", folder, "-o", out, "--workers", 1).code == 0
     assert json.loads((out / "manifest.json").read_text(encoding="utf-8"))["complete"]
 

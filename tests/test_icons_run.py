@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from dotwave.errors import AppError
 from dotwave.icon_journal import Journal
 from dotwave.icon_pool import LocalPool
 from dotwave.icon_work import Recipe, Record, Task
@@ -346,3 +347,12 @@ def test_a_journal_cut_short_in_its_first_line_goes_on(tmp_path: Path, cut: int)
             journal.add({"key": "b"})
     with Journal(tmp_path / "x.jsonl") as journal:
         assert journal.find("b") == {"key": "b"}
+
+
+@pytest.mark.parametrize("name", ["index.html", "manifest.json", "waveforms"])
+def test_a_folder_of_others_is_left_as_it_is(tmp_path: Path, name: str) -> None:
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / name).write_text("somebody's own")
+    with pytest.raises(AppError, match=f"has {name}, and no journal.jsonl that says dotwave made it; give another"):
+        render_icons([str(SAMPLES)], tmp_path / "site", IconOptions(workers=1))
+    assert [path.read_text() for path in (tmp_path / "site").iterdir()] == ["somebody's own"]

@@ -106,5 +106,5 @@ def test_without_spread_nothing_is_said_of_it(tmp_path: Path, monkeypatch: pytes
 def test_a_wrong_spread_names_its_field(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match=r"spread\.frequncy"):
         render_job(write_job(tmp_path, ", spread: {frequncy: 0.01}"))
-    with pytest.raises(ProfileError, match=r"spread\.lam.*less than or equal to 1"):
+    with pytest.raises(ProfileError, match=r"spread\.lam: expected a number <= 1"):
         render_job(write_job(tmp_path, ", spread: {lam: 3.0}"))

@@ -121,8 +121,9 @@ def test_tones_are_kept() -> None:
 def test_a_damaged_plan_is_made_again(caplog: pytest.LogCaptureFixture) -> None:
     kept = PlanCache(SINGLE, 20.0)
     kept.keep([(b"sound", state()), (b"ill", state())])
-    assert kept._connection is not None
-    kept._connection.execute("UPDATE plans SET value = x'00' WHERE key = ?", (kept._key(b"ill"),))
+    connection = kept._file._connection
+    assert connection is not None
+    connection.execute("UPDATE plans SET value = x'00' WHERE key = ?", (kept._key(b"ill"),))
     again = PlanCache(SINGLE, 20.0)
     assert [one is None for one in again.find([b"sound", b"ill"])] == [False, True]
     again.keep([(b"ill", state())])

@@ -13,7 +13,8 @@ from hypothesis.extra.numpy import arrays
 from chainsim import Chain, load_device
 from planner.amplitudes import refine
 from planner.amplitudes.vibration import Vibration
-from planner.cache import ASKED_AT_ONCE, PlanCache
+from planner.cache import PlanCache
+from planner.cache_file import ASKED_AT_ONCE
 from planner.closed_forms.links import links_for
 from planner.plan import Ramp
 from planner.transitions import jets
@@ -130,7 +131,7 @@ def test_many_plans_are_asked_for_at_once(tmp_path, monkeypatch):
     items = [b"%d" % k for k in range(ASKED_AT_ONCE + 10)]
     cache.keep((item, Ramp(t_s=np.arange(float(k)))) for k, item in enumerate(items))
     asked = []
-    cache._connection.set_trace_callback(asked.append)
+    cache._file._connection.set_trace_callback(asked.append)
     found = cache.find([*items, b"none"])
     assert len(asked) == 2
     assert found.pop() is None
