@@ -265,7 +265,7 @@ def test_preload_and_bias_shift_the_rest():
 
 
 def test_no_compiler_is_imported_before_an_integration():
-    names = "averaging.envelope, averaging.rung, continuation.continuation, continuation.locking, continuation.spectrum"
+    names = "averaging.envelope, averaging.rung, continuation.path, continuation.locking, continuation.spectrum"
     names += ", effects.effects, effects.tones"
     loads = "; ".join(f"import chainsim.{name}" for name in names.split(", "))
     code = f"import sys; {loads}; print({{'numba', 'scipy', 'matplotlib'}} & set(sys.modules))"

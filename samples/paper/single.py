@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from chainsim.continuation.continuation import Path as Branch
-from chainsim.continuation.continuation import continue_branch
+from chainsim.continuation.path import Path as Branch
+from chainsim.continuation.path import continue_branch
 from numpy.typing import NDArray
 
 from chainsim import Chain, GridIntegrator, Setting, load_device

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from chainsim.continuation.continuation import continue_branch
+from chainsim.continuation.path import continue_branch
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Setting, balance_near, solve
