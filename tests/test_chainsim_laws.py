@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from chainsim import Chain, Setting, solve, sweep
+from chainsim import Chain, Setting, follow, rest_eigenvalues, solve, sweep
+from chainsim.averaging.envelope import EnvelopeError
 from chainsim.equations.coupling import CouplingLaw
 from chainsim.equations.scaled_chain import ScaledChain
 
@@ -128,6 +129,36 @@ def test_the_linear_rung_solves_the_system(law, kind):
     for rung in ("linear", "harmonic_balance", "ode"):
         found = solve(chain, setting, tol=1e-9, rung=rung)
         assert (np.abs(found.phasor - wanted) <= 1e-8 * np.abs(wanted).max(axis=1, keepdims=True)).all()
+
+
+@each_law
+def test_eigenvalues_at_rest_are_those_of_the_system(law, kind):
+    chain = built(law, kind)
+    setting = chosen(chain)
+    stiffness = stiffness_matrix(chain, setting)
+    zero, one = np.zeros_like(stiffness), np.broadcast_to(np.eye(N), stiffness.shape)
+    matrix = np.block([[zero, one], [-stiffness, -DELTA * one]])
+    # Coefficients of the characteristic polynomial: the eigenvalues of a defective matrix are known to few digits.
+    for values, system in zip(rest_eigenvalues(chain, setting), matrix, strict=True):
+        assert np.allclose(np.poly(values), np.poly(system), atol=1e-9)
+
+
+def test_eigenvalues_at_rest_know_how_oscillators_differ():
+    chain = Chain.of(3, delta=[0.1, 0.2, 0.3], beta=-1.0, stiffness=[1.0, 1.2, 0.9])
+    found = rest_eigenvalues(chain, Setting.of(chain, epsilon=0.0, lam=[0.3, 0.4], omega=2.0))[0]
+    wanted = np.concatenate([np.roots([1, delta, k]) for delta, k in ((0.1, 1.0), (0.2, 1.5), (0.3, 1.3))])
+    assert np.allclose(np.sort_complex(found), np.sort_complex(wanted), atol=1e-12)
+
+
+def test_an_open_end_takes_no_link_under_any_law():
+    for law in LAWS:
+        chain = built(law, "resistor")
+        links = np.full((2, N), 0.05)
+        if chain.law.closed:
+            follow(chain, chosen(chain), [0.0, 1.0], tol=1e-3, lam=links)
+            continue
+        with pytest.raises(EnvelopeError, match="the first oscillator of an open chain has no link"):
+            follow(chain, chosen(chain), [0.0, 1.0], tol=1e-3, lam=links)
 
 
 @each_law

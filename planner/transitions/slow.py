@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, GridIntegrator
+from chainsim import Closure, Device
 
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
@@ -80,6 +80,9 @@ def _settled(device: Device, point: OperatingPoint, rise: float, tolerance: floa
     lam = np.concatenate([point.lam[:1], point.lam])[None, :]
     ring = device.coupling.closure is Closure.RING
     chain = device.chain
+    # Imported here: it needs a compiler.
+    from chainsim import GridIntegrator
+
     grid = GridIntegrator(
         shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
         ring=ring, dtau=dtau,

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from chainsim.continuation.path import Path as Branch
-from chainsim.continuation.path import continue_branch
 from numpy.typing import NDArray
 
 from chainsim import Chain, GridIntegrator, Setting, load_device
+from chainsim.continuation.path import Path as Branch
+from chainsim.continuation.path import continue_branch
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
 

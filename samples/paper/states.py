@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from chainsim.continuation.path import continue_branch
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Setting, balance_near, solve
 from chainsim.averaging.envelope import follow
 from chainsim.continuation.locking import locking
+from chainsim.continuation.path import continue_branch
 from chainsim.continuation.spectrum import delta_from_critical_lam
 
 from .page import BLUE, GREY, ORANGE, RED, Finding, Page, sheet
