@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import ChainState, FramePlan, Ramp
+from planner import FramePlan, OperatingPoint, Ramp
 
 __all__ = ["CouplingEvent", "CouplingWriter", "LamTrack"]
 
@@ -84,7 +84,7 @@ class _RowPath:
     after: Floats
 
     @classmethod
-    def of(cls, device: Device, states: Sequence[ChainState], ramps: Sequence[Ramp | None]) -> _RowPath:
+    def of(cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]) -> _RowPath:
         nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
         # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
         t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import ChainState, FramePlan, Plan, Ramp
+from planner import FramePlan, OperatingPoint, Plan, Ramp
 
 from .channels import Channel, Role, channels_of
 from .curve import curve
@@ -167,7 +167,7 @@ class _DriveTone(NamedTuple):
     slopes: Complexes | None
 
 
-def _tones(state: ChainState, ramp: Ramp | None) -> Iterator[_DriveTone]:
+def _tones(state: OperatingPoint, ramp: Ramp | None) -> Iterator[_DriveTone]:
     """The tones that sound, each frequency once."""
     held = {state.omega: state.epsilon} | {tone.omega: tone.epsilon for tone in state.tones}
     way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
@@ -193,7 +193,7 @@ def _drive(tone: _DriveTone, ramp: Ramp | None, since_s: Floats, carrier: _Carri
         out[end:] += held.real * carrier.cos[end:] - held.imag * carrier.sin[end:]
 
 
-def _bias(state: ChainState, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:
+def _bias(state: OperatingPoint, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:
     """Put the bias volts of one chain's actuators into `out`, shape (n, S), which is zero."""
     end = _ramp_samples(ramp, since_s) if ramp is not None and ramp.bias is not None else 0
     for actuator, row in enumerate(out):

@@ -6,7 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .errors import ContrastError, DwellTooShort, PlanError, SceneDoesNotFit
-from .plan import ChainState, FramePlan, Margins, Plan, Ramp, Tone, ToneRamp
+from .operating_point import Margins, OperatingPoint, Tone
+from .plan import FramePlan, Plan, Ramp, ToneRamp
 from .scene_plan import DEFAULT_CONTRAST_DB, plan_scene
 
 if TYPE_CHECKING:
@@ -19,13 +20,11 @@ if TYPE_CHECKING:
     from .outlook import FrameSpread, TradePoint
     from .robustness.robust import (
         Accuracy,
-        Held,
         RobustError,
         RobustPlan,
         TradeRow,
         Trial,
         accuracy_needed,
-        hold,
         robust_plan,
     )
     from .robustness.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
@@ -36,15 +35,14 @@ __all__ = [
     "DEFAULT_CONTRAST_DB",
     "Accuracy",
     "ChainFit",
-    "ChainState",
     "Choice",
     "ContrastError",
     "DwellTooShort",
     "FramePlan",
     "FrameSpread",
-    "Held",
     "HigherMode",
     "Margins",
+    "OperatingPoint",
     "ParetoError",
     "ParetoFront",
     "ParetoPoint",
@@ -78,7 +76,6 @@ __all__ = [
     "climb",
     "fit_chain",
     "front_of",
-    "hold",
     "pareto_of",
     "plan_scene",
     "questions_of",
@@ -118,7 +115,6 @@ _LATE = {
     "Requirement": "analysis.requirement",
     "Accuracy": "robustness.robust",
     "ChainFit": "identification.calibration",
-    "Held": "robustness.robust",
     "RobustError": "robustness.robust",
     "RobustPlan": "robustness.robust",
     "Spread": "robustness.spread",
@@ -131,7 +127,6 @@ _LATE = {
     "Wish": "robustness.spread",
     "accuracy_needed": "robustness.robust",
     "fit_chain": "identification.calibration",
-    "hold": "robustness.robust",
     "robust_plan": "robustness.robust",
     "spread_of": "robustness.spread",
     "wish_of": "robustness.spread",

@@ -20,7 +20,7 @@ from drivers.coupling import CouplingWriter, LamTrack
 from drivers.hold import hold_inverse
 from drivers.timeline import Stretch
 from encoders import Frame, TargetPattern
-from planner import ChainState, FramePlan, Margins, Plan, Ramp
+from planner import FramePlan, Margins, OperatingPoint, Plan, Ramp
 
 PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
 NAMES = ["linked-6x6", "paper-6x6", "independent-6x6", "linked-40x96"]
@@ -42,9 +42,11 @@ def load(name: str) -> Device:
     )
 
 
-def state(device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float = 0.0, bias: float = 0.0) -> ChainState:
+def state(
+    device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float = 0.0, bias: float = 0.0
+) -> OperatingPoint:
     n = device.chain_length
-    return ChainState(
+    return OperatingPoint(
         target=np.ones(n), epsilon=epsilon, lam=np.full(n - 1, lam), bias=np.full(n, bias), omega=omega,
         phasor=np.zeros(n, dtype=np.complex128), mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0),
         outcome=Outcome.OK,
@@ -52,7 +54,7 @@ def state(device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float 
 
 
 def frame(
-    device: Device, start_s: float, end_s: float, states: list[ChainState], ramps: list[Ramp | None] | None = None
+    device: Device, start_s: float, end_s: float, states: list[OperatingPoint], ramps: list[Ramp | None] | None = None
 ) -> FramePlan:
     count = device.rows * device.chains_per_row
     states = states * (count // len(states))

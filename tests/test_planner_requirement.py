@@ -12,8 +12,8 @@ from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, l
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
 from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
-from planner import ChainState, FramePlan, Margins, Spread, Tone, plan_scene, spread_of
-from planner.analysis.effects import StandingChain
+from planner import FramePlan, Margins, OperatingPoint, Spread, Tone, plan_scene, spread_of
+from planner.analysis.effects import Linearisation
 from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
 from planner.surroundings import HigherMode, Surroundings, assumed
@@ -35,7 +35,7 @@ def held(device, setting, *, phase=None):
         return None
     drive = complex(setting.epsilon[0] * np.exp(1j * setting.phase[0]))
     felt = response.phasor[0] if drive else np.zeros(device.chain_length, complex)
-    return ChainState(
+    return OperatingPoint(
         np.abs(felt + response.mean[0]) / device.full_scale, drive, setting.lam[0, 1:], setting.bias[0],
         float(setting.omega[0]), felt, response.mean[0], 0.0, Margins(0.0, 0.0), Outcome.OK, phase,
     )  # fmt: skip
@@ -216,7 +216,7 @@ def test_third_harmonic_is_what_one_harmonic_is_off_by(closure):
     coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
     device = device_of(3, coupling=coupling)
     device, state = vibrating(device=device, lam=0.02, omega=0.97)
-    moved = StandingChain.of(device, state).without_third()[0]
+    moved = Linearisation(device.chain, state).without_third()[0]
     setting = setting_of(device, state, NOTHING)
     if closure == "open":
         one = solve(device.chain, setting, tol=1e-3, rung="one_harmonic", start="rest").phasor[0]
@@ -229,7 +229,7 @@ def test_third_harmonic_is_what_one_harmonic_is_off_by(closure):
 def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
     coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
     device, state = vibrating(device=device_of(3, coupling=coupling), lam=0.02, omega=0.95)
-    standing = StandingChain.of(device, state)
+    standing = Linearisation(device.chain, state)
     setting = setting_of(device, state, NOTHING)
     more = Setting.of(device.chain, epsilon=1.001 * setting.epsilon, lam=state.lam[0], omega=setting.omega)
     before, after = (solve(device.chain, one, tol=1e-11, start="rest").phasor[0] for one in (setting, more))
@@ -318,7 +318,7 @@ def test_tones_and_what_they_add_up_to():
     device, first = vibrating(amplitude=0.03, lam=0.05, omega=0.95)
     _, second = vibrating(amplitude=0.03, lam=0.05, omega=1.12)
     both = replace(first, tones=(Tone(second.omega, second.epsilon, second.phasor),))
-    standing = StandingChain.of(device, both)
+    standing = Linearisation(device.chain, both)
     assert standing.size == pytest.approx(np.abs(first.phasor) + np.abs(second.phasor))
     for change, state in zip(standing.without_cubic(), (first, second), strict=True):
         linear = solve(device.chain, setting_of(device, state, NOTHING), tol=1e-6, rung="linear", start="rest")

@@ -16,7 +16,7 @@ from planner.amplitudes.deflection import Deflection
 from planner.amplitudes.vibration import Vibration
 from planner.closed_forms.links import drive_for, links_for
 from planner.errors import PlanError
-from planner.plan import ChainState, Tone
+from planner.operating_point import OperatingPoint, Tone
 from planner.robustness.batch_march import Parts, march
 from planner.robustness.ring_march import march_ring
 from planner.robustness.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
@@ -149,7 +149,7 @@ def test_quantiles_of_one_linear_actuator_are_those_of_the_normal_distribution()
     assert report.quantile(1.0) == report.error.max()
 
 
-def states(targets: Floats) -> list[ChainState]:
+def states(targets: Floats) -> list[OperatingPoint]:
     return Vibration(DEVICE, 20.0).states(np.maximum(targets, 0.1))
 
 
@@ -330,7 +330,7 @@ def test_rings_whose_branch_ends_are_not_felt() -> None:
     assert np.abs(left[:, 0, ~lost]).max() < 1e-9
 
 
-def walking(lam: float = 0.02, amplitude: float = 0.01, n: int = 6) -> ChainState:
+def walking(lam: float = 0.02, amplitude: float = 0.01, n: int = 6) -> OperatingPoint:
     """Two tones under one lam, as a device without spread holds them."""
     chain = Chain(n, 5.3e-3, -1.0)
     found = two_tones(chain, amplitude=amplitude, width=2.0, lam=lam)

@@ -7,7 +7,7 @@ and way in are tried in the full equations from rest, so that the error is that 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from encoders import TargetPattern
 
 from ..amplitudes.floor import LOWER, idle_profiles
 from ..closed_forms.links import detuning_gain, links_for
+from ..operating_point import OperatingPoint
 from ..transitions.check import Way
 from ..transitions.envelopes import EnvelopeRamp, change, rise
-from .effects import Line, StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoError, ParetoFront, ParetoPoint, front_of
 
 __all__ = ["ParetoError", "ParetoFront", "ParetoPoint", "front_of", "pareto_of"]
@@ -133,14 +134,12 @@ class _Candidates:
     def _scatter(self, way: EnvelopeRamp) -> float:
         chain, worst = self.device.chain, 0.0
         for target, epsilon, lam in zip(self.target, way.epsilon[:, -1], self.lam, strict=True):
-            drive, bias = complex(epsilon), np.zeros(chain.n)
-            links, nowhere = np.concatenate([[0.0], lam]), np.zeros(chain.n, np.complex128)
+            point = OperatingPoint(complex(epsilon), lam, self.omega)
             stiffening = 0.75 * chain.beta * (target * self.device.full_scale) ** 2
-            silent = StandingChain(chain, links, bias, (Line(self.omega, drive, nowhere),))
-            force = np.concatenate([[drive], nowhere[1:]])
-            phasor = np.asarray(np.linalg.solve(silent.impedance(self.omega, stiffening), force), np.complex128)
-            standing = StandingChain(chain, links, bias, (Line(self.omega, drive, phasor),))
-            worst = max(worst, float(standing.scattered(SIGMA, np.zeros(chain.n, np.bool_)).max()))
+            force = np.concatenate([[point.epsilon], np.zeros(chain.n - 1, np.complex128)])
+            impedance = Linearisation(chain, point).impedance(self.omega, stiffening)
+            point = replace(point, phasor=np.asarray(np.linalg.solve(impedance, force), np.complex128))
+            worst = max(worst, float(Linearisation(chain, point).scattered(SIGMA, np.zeros(chain.n, np.bool_)).max()))
         return worst / self.device.full_scale
 
     def _felt(self, ways: list[EnvelopeRamp]) -> tuple[Complexes, Floats]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Chain, Closure, Device
 
 from ..errors import PlanError
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
 from .batch_march import Motion, Parts, march
 
 __all__ = [
@@ -255,7 +255,7 @@ def judge(wish: Wish, motion: Motion, *, tolerance: float, threshold: float) -> 
     return SpreadReport(error, right, tolerance)
 
 
-def wish_of(device: Device, states: Sequence[ChainState]) -> Wish:
+def wish_of(device: Device, states: Sequence[OperatingPoint]) -> Wish:
     """What planned states were planned for; chains at one frequency share their phase."""
     target = np.array([state.target for state in states])
     phase = np.array([np.full(len(state.target), np.nan) if state.phase is None else state.phase for state in states])
@@ -264,7 +264,7 @@ def wish_of(device: Device, states: Sequence[ChainState]) -> Wish:
     return Wish(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
 
 
-def motion_of(states: Sequence[ChainState], parts: Parts, ring: Parts | None = None) -> Motion:
+def motion_of(states: Sequence[OperatingPoint], parts: Parts, ring: Parts | None = None) -> Motion:
     """What chains do when each holds its state: `parts` of shape (n, chains, count).
 
     `ring` : where they are rings, the ones they are drawn around, of shape (n, chains, 1).
@@ -317,7 +317,7 @@ def drawn_in(device: Device, spread: Spread, places: Sequence[int], *, count: in
 
 def spread_of(
     device: Device,
-    states: Sequence[ChainState],
+    states: Sequence[OperatingPoint],
     spread: Spread,
     *,
     tolerance: float,

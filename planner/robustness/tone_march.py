@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
 from .batch_march import Parts
 
 __all__ = ["ToneMotion", "march_tones"]
@@ -41,7 +41,7 @@ class ToneMotion(NamedTuple):
     lost: Bools
 
 
-def march_tones(state: ChainState, parts: Parts) -> ToneMotion:
+def march_tones(state: OperatingPoint, parts: Parts) -> ToneMotion:
     """The motion of one chain that holds a state of several tones; `parts` of shape (n, count).
 
     Raises

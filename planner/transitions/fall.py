@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way, travel
 from .limits import WayLimits, checked
 from .rise import orbit_of, ramp_of
 from .search import MET, MOST_PERIODS, STANDS, Search
 from .slow_flow import Course, follow_course
-from .steering import Standing, Steering, rest, smooth_step
+from .steering import Steering, rest, smooth_step
 
 __all__ = ["find_fall"]
 
@@ -51,7 +52,7 @@ def find_fall(
     Parameters, errors: as `find_way`.
     """
     held = checked(chain, epsilon, lam, omega, phasor, limits, tau_per_s)
-    orbit, lacking = orbit_of(chain, held, omega)
+    orbit, lacking = orbit_of(chain, held)
     if orbit is None or lacking:
         return ramp_of(_let_go(held, omega, limits, 0.0), limits, tau_per_s, lacking)
     stopped = _stopped(chain, held, orbit, omega, limits, tau_per_s, budget)
@@ -61,10 +62,10 @@ def find_fall(
 
 
 def _stopped(
-    chain: Chain, held: Standing, orbit: Orbit, omega: float, limits: WayLimits, tau_per_s: float, budget: int
+    chain: Chain, held: OperatingPoint, orbit: Orbit, omega: float, limits: WayLimits, tau_per_s: float, budget: int
 ) -> Way | None:
     """The shortest way found whose end is stopped by the drive."""
-    held = Standing(held.epsilon, held.lam, orbit.harmonics[0])
+    held = replace(held, phasor=orbit.harmonics[0])
     calm = CALM * float(np.abs(held.phasor).max())
     found: list[tuple[Search, Steering, Floats]] = []
     longest = MOST_PERIODS * 2 * math.pi / omega
@@ -72,8 +73,8 @@ def _stopped(
     while waits:
         wait = waits.pop(0)
         ahead = _let_go(held, omega, limits, wait)
-        start = replace(rest(ahead.lam[-1]), phasor=_left(chain, held, omega, ahead))
-        search = Search(chain, start, rest(ahead.lam[-1]), omega, limits, tau_per_s, budget, orbit, ahead, spent)
+        start = replace(rest(ahead.lam[-1], omega), phasor=_left(chain, held, omega, ahead))
+        search = Search(chain, start, rest(ahead.lam[-1], omega), omega, limits, tau_per_s, budget, orbit, ahead, spent)
         task = search.task(STOP * search.first_length)
         task = search.task(max(task.duration, INTERVAL * task.intervals / omega))
         unknowns = _after(search, task, found)
@@ -101,7 +102,7 @@ def _after(search: Search, task: Steering, found: list[tuple[Search, Steering, F
     return steered.unknowns if steered.missed <= MET else None
 
 
-def _let_go(held: Standing, omega: float, limits: WayLimits, wait: float) -> Way:
+def _let_go(held: OperatingPoint, omega: float, limits: WayLimits, wait: float) -> Way:
     """Drive and links taken away, and so long a wait (tau) after it."""
     length = 2 * math.pi / omega * PERIODS
     x = np.linspace(0.0, 1.0, 4 * PERIODS + 1)
@@ -119,7 +120,7 @@ def _still(tau: Floats, lam: Floats) -> Way:
     return Way(tau, nothing, nothing, tau, np.repeat(lam[None, :], len(tau), axis=0))
 
 
-def _left(chain: Chain, held: Standing, omega: float, way: Way) -> Complexes:
+def _left(chain: Chain, held: OperatingPoint, omega: float, way: Way) -> Complexes:
     """Amplitudes at the end of a way on the slow flow."""
     duration = float(way.tau[-1])
     rate = abs(1 - omega**2) + chain.delta + float(held.lam.max(initial=0.0))
@@ -133,7 +134,7 @@ def _left(chain: Chain, held: Standing, omega: float, way: Way) -> Complexes:
     return np.asarray(follow_course(chain, omega, duration, course, held.phasor, 1.0)[-1, :, 0])
 
 
-def _died(chain: Chain, held: Standing, orbit: Orbit, limits: WayLimits, tau_per_s: float) -> Ramp:
+def _died(chain: Chain, held: OperatingPoint, orbit: Orbit, limits: WayLimits, tau_per_s: float) -> Ramp:
     """The way on which the motion dies away by itself."""
     omega, lacking = orbit.omega, ""
     way = _let_go(held, omega, limits, 0.0)

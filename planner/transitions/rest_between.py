@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from chainsim import Device, GridIntegrator
 
-from ..plan import ChainState, Ramp
+from ..operating_point import OperatingPoint
+from ..plan import Ramp
 from .check import SAMPLES_PER_PERIOD as SAMPLES
 from .check import Orbit
 from .rise import orbit_of
-from .steering import Standing
 
 __all__ = ["rested"]
 
@@ -31,7 +31,7 @@ RESTS, WATCHED = (0.0, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 9.0, 14.0, 20.0, 30.0), 2.0
 GOOD, LIKE = 7e-4, 1.2
 
 
-def rested(device: Device, before: ChainState, after: ChainState, way: Callable[[float], Ramp]) -> Ramp:
+def rested(device: Device, before: OperatingPoint, after: OperatingPoint, way: Callable[[float], Ramp]) -> Ramp:
     """The way with the shortest rest after which `after` stands, or stands as well as after any.
 
     Parameters
@@ -49,7 +49,7 @@ def rested(device: Device, before: ChainState, after: ChainState, way: Callable[
     return next(ramp for missed, ramp in tried if missed <= LIKE * least)
 
 
-def _missed(device: Device, before: ChainState, after: ChainState, ramp: Ramp) -> float:
+def _missed(device: Device, before: OperatingPoint, after: OperatingPoint, ramp: Ramp) -> float:
     """Worst deviation after the way, relative to the largest amplitude of `after`."""
     dtau = 2 * math.pi / after.omega / SAMPLES
     steps = math.ceil(ramp.duration_s * device.tau_per_s / dtau)
@@ -74,15 +74,14 @@ def _missed(device: Device, before: ChainState, after: ChainState, ramp: Ramp) -
     return float(away) if np.isfinite(away) else math.inf
 
 
-def _prelude(device: Device, held: ChainState, dtau: float) -> Floats:
+def _prelude(device: Device, held: OperatingPoint, dtau: float) -> Floats:
     """Forces on every actuator that lead from rest to a motion at tau = 0, up to the sample before it."""
-    standing = Standing(held.epsilon, held.lam, held.phasor)
-    orbit = orbit_of(device.chain, standing, held.omega)[0] or Orbit(held.phasor[None, :], held.lam, held.omega)
+    orbit = orbit_of(device.chain, held)[0] or Orbit(held.phasor[None, :], held.lam, held.omega)
     half = held.omega * dtau / 2
     return orbit.prelude(device.chain, dtau, 0.0) * (half / math.sin(half)) ** 2
 
 
-def _drive(device: Device, after: ChainState, ramp: Ramp, tau: Floats, dtau: float) -> Floats:
+def _drive(device: Device, after: OperatingPoint, ramp: Ramp, tau: Floats, dtau: float) -> Floats:
     """The drive's force on the way and after it."""
     t_s = tau / device.tau_per_s
     on_way = t_s < ramp.duration_s

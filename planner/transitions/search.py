@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..operating_point import OperatingPoint
 from .check import Orbit, Passage, Way, travel
 from .gauss_newton import Steered, slopes_at, steer
 from .hermite import broken_line
 from .limits import WayLimits
-from .steering import LinkCourse, Standing, Steering
+from .steering import LinkCourse, Steering
 
 __all__ = ["ARRIVES", "MOST_PERIODS", "STANDS", "Search"]
 
@@ -61,8 +62,8 @@ class Search:
     """
 
     chain: Chain
-    start: Standing
-    held: Standing
+    start: OperatingPoint
+    held: OperatingPoint
     omega: float
     limits: WayLimits
     tau_per_s: float

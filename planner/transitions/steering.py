@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..operating_point import OperatingPoint
 from .slow_flow import Course, follow_course
 
-__all__ = ["LinkCourse", "Standing", "Steering", "rest", "smooth_step"]
+__all__ = ["LinkCourse", "Steering", "rest", "smooth_step"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -33,30 +34,9 @@ STEP = 0.25
 MOVEMENT, LOOKS, EFFORT = 0.02, 40, 1e-4
 
 
-@dataclass(frozen=True)
-class Standing:
-    """A steady motion of a chain of n, or rest.
-
-    Attributes
-    ----------
-    epsilon : complex drive phasor. lam : float64, shape (n-1,), links. phasor : complex128, shape (n,), dimensionless.
-    turning : radians per tau by which drive and motion turn in the frame of the way.
-    """
-
-    epsilon: complex
-    lam: Floats
-    phasor: Complexes
-    turning: float = 0.0
-
-    @property
-    def resting(self) -> bool:
-        """Whether nothing moves: links are then free."""
-        return not self.phasor.any()
-
-
-def rest(lam: Floats) -> Standing:
+def rest(lam: Floats, omega: float) -> OperatingPoint:
     """Rest, with links of which only the number matters where they may move."""
-    return Standing(0j, lam, np.zeros(len(lam) + 1, dtype=np.complex128))
+    return OperatingPoint(0j, lam, omega, np.zeros(len(lam) + 1, dtype=np.complex128))
 
 
 @dataclass(frozen=True)
@@ -69,7 +49,7 @@ class LinkCourse:
     top: float | None
     share: float
 
-    def at(self, x: Floats, start: Standing, held: Standing) -> tuple[Floats, Floats]:
+    def at(self, x: Floats, start: OperatingPoint, held: OperatingPoint) -> tuple[Floats, Floats]:
         """Links and their derivatives in x at x in [0, 1]; each float64, shape (len(x), n-1)."""
         if self.top is None:
             still = np.repeat((start if held.resting else held).lam[None, :], len(x), axis=0)
@@ -109,12 +89,15 @@ def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Steering:
-    """The task: `chain` at `omega` from `start` to `held` in `duration` (tau) with the links on `links`."""
+    """The task: `chain` at `omega` from `start` to `held` in `duration` (tau) with the links on `links`.
+
+    A start at another frequency than `omega` turns in the frame of the way.
+    """
 
     chain: Chain
     omega: float
-    start: Standing
-    held: Standing
+    start: OperatingPoint
+    held: OperatingPoint
     links: LinkCourse
     duration: float
 
@@ -154,7 +137,7 @@ class Steering:
         factors = self.unit * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
         value, slope = splines(x, self.intervals)
         step, step_slope = smooth_step(x)
-        last, angle = self.held.epsilon, 1j * self.start.turning * self.duration
+        last, angle = self.held.epsilon, 1j * (self.start.omega - self.omega) * self.duration
         first = self.start.epsilon * np.exp(angle * x)
         steady, steady_slope = first + (last - first) * step, (last - first) * step_slope + angle * first * (1 - step)
         return np.asarray(steady[:, None] + value @ factors), np.asarray(steady_slope[:, None] + slope @ factors)

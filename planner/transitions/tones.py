@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from chainsim import Device, GridIntegrator
 
-from ..plan import Ramp, Tone, ToneRamp
+from ..operating_point import OperatingPoint, Tone
+from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
 from .hermite import broken_line
 from .limits import WayLimits
 from .search import COMING_DOWN, MET, NODES_PER_INTERVAL, PIECE_S, STRONG
-from .slow import SAMPLES, STAYS, Sounding, felt_envelope
-from .steering import LinkCourse, Standing, Steering, rest, smooth_step
+from .slow import SAMPLES, STAYS, felt_envelope
+from .steering import LinkCourse, Steering, rest, smooth_step
 
 __all__ = ["quick_rise"]
 
@@ -43,10 +44,10 @@ class _OneOfTwo(Steering):
         return np.repeat(square[None, :], len(x), axis=0)
 
 
-def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: float) -> Ramp | None:
+def quick_rise(device: Device, point: OperatingPoint, limits: WayLimits, tolerance: float) -> Ramp | None:
     """The way, or None where it is none within the limits; `tolerance` relative to the largest amplitude."""
-    mains = [tone for tone in held.tones if not tone.side]
-    tasks = [_task(device, held, mains[k], mains[1 - k], limits) for k in (0, 1)]
+    mains = [tone for tone in point.every_tone if not tone.side]
+    tasks = [_task(device, point, mains[k], mains[1 - k], limits) for k in (0, 1)]
     steered = [steer(task, np.zeros(task.size), 0.0, STEPS) for task in tasks]
     if max(one.missed for one in steered) > MET:
         return None
@@ -55,7 +56,7 @@ def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: flo
     step, step_slope = smooth_step(x)
     own = dict(zip((tone.omega for tone in mains), zip(tasks, steered, strict=True), strict=True))
     tones = []
-    for tone in held.tones:
+    for tone in point.every_tone:
         value, slope = tone.epsilon * step, tone.epsilon * step_slope
         if not tone.side:
             one, found = own[tone.omega]
@@ -67,7 +68,7 @@ def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: flo
     pieces = max(8, math.ceil(task.duration / device.tau_per_s / PIECE_S))
     lam = np.clip(broken_line(links[None], links_slope[None], pieces)[0], limits.lam_min, links.max())
     tau, lam_tau = x * task.duration, np.linspace(0.0, task.duration, pieces + 1)
-    settled = _settled(device, held, _Played(tau, lam_tau, lam, tuple(tones)), limits, tolerance)
+    settled = _settled(device, point, _Played(tau, lam_tau, lam, tuple(tones)), limits, tolerance)
     if settled is None or _too_strong(tones, limits, device.tau_per_s):
         return None
     t_s = np.append(tau, max(settled, tau[-1] * (1 + 1e-9))) / device.tau_per_s
@@ -76,12 +77,12 @@ def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: flo
     )
 
 
-def _task(device: Device, held: Sounding, tone: Tone, other: Tone, limits: WayLimits) -> _OneOfTwo:
-    top = max(min(limits.lam_max, STRONG), float(held.lam.max()))
+def _task(device: Device, point: OperatingPoint, tone: Tone, other: Tone, limits: WayLimits) -> _OneOfTwo:
+    top = max(min(limits.lam_max, STRONG), float(point.lam.max()))
     duration = STAGE_TIMES * (device.chain_length + 1) * 2 * tone.omega / max(top, device.delta)
-    standing = Standing(tone.epsilon, held.lam, tone.phasor)
+    end = OperatingPoint(tone.epsilon, point.lam, tone.omega, tone.phasor)
     links = LinkCourse(top, COMING_DOWN)
-    return _OneOfTwo(device.chain, tone.omega, rest(held.lam), standing, links, duration, other.phasor)
+    return _OneOfTwo(device.chain, tone.omega, rest(point.lam, tone.omega), end, links, duration, other.phasor)
 
 
 def _too_strong(tones: list[ToneRamp], limits: WayLimits, tau_per_s: float) -> bool:
@@ -109,13 +110,13 @@ class _Played:
         return np.where(tau < self.tau[-1], here, tone.epsilon[-1])
 
 
-def _settled(device: Device, held: Sounding, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
+def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good at every place of the beat; None where it does not."""
-    n, omega = device.chain_length, held.tones[0].omega
+    n, omega = device.chain_length, point.omega
     dtau = 2 * math.pi / omega / SAMPLES
     periods = math.ceil((float(way.tau[-1]) + WAIT * 2 / device.delta) / dtau / SAMPLES)
     tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
-    gap = next(tone.omega for tone in held.tones[1:] if not tone.side) - omega
+    gap = next(tone.omega for tone in point.tones if not tone.side) - omega
     lam = np.zeros((len(tau), 1, n))
     for link in range(n - 1):
         lam[:, 0, link + 1] = np.interp(tau, way.lam_tau, way.lam[:, link])
@@ -123,7 +124,7 @@ def _settled(device: Device, held: Sounding, way: _Played, limits: WayLimits, to
     last = 0
     for beat in BEATS:
         force, wanted = np.zeros((len(tau), 1, n)), np.zeros((len(tau), n))
-        for tone, envelope in zip(held.tones, envelopes, strict=True):
+        for tone, envelope in zip(point.every_tone, envelopes, strict=True):
             turning = np.exp(1j * (tone.omega * tau + 2 * math.pi * beat * round((tone.omega - omega) / gap)))
             # Straight lines between samples pass a carrier with sinc^2.
             half = tone.omega * dtau / 2
@@ -133,7 +134,7 @@ def _settled(device: Device, held: Sounding, way: _Played, limits: WayLimits, to
         z = grid.advance(force, lam)[:, 0]
         if not np.abs(z).max() <= limits.hilltop(device.chain):
             return None
-        scale = sum(float(np.abs(tone.phasor).max()) for tone in held.tones)
+        scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
         away = np.abs(felt_envelope(z, omega, tau) - felt_envelope(wanted, omega, tau)).max(axis=1)
         bad = np.flatnonzero(~(away <= tolerance * scale))
         last = max(last, int(bad[-1]) + 1 if len(bad) else 0)
