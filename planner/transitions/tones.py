@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device, GridIntegrator
+from chainsim import Device
 
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
@@ -112,6 +112,8 @@ class _Played:
 
 def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good at every place of the beat; None where it does not."""
+    from chainsim import GridIntegrator
+
     n, omega = device.chain_length, point.omega
     dtau = 2 * math.pi / omega / SAMPLES
     periods = math.ceil((float(way.tau[-1]) + WAIT * 2 / device.delta) / dtau / SAMPLES)
