@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import FramePlan, OperatingPoint, Plan, Ramp
+from planner import FirstOrderHold, FramePlan, OperatingPoint, Plan, Ramp, curve
 
 from .channels import Channel, Role, channels_of
-from .curve import curve
-from .hold import hold_inverse
 from .shaping import Shaper
 from .timeline import Stretch, stretches
 
@@ -139,7 +137,7 @@ class Waveform:
 class _Carrier:
     """cos and sin of omega tau at the samples of a chunk, float64, shape (S,), and what the hold takes away.
 
-    An envelope E is sampled as ``gain E + i lead_s E'``, E' per second (see `hold_inverse`).
+    An envelope E is sampled as ``gain E + i lead_s E'``, E' per second (see `planner.FirstOrderHold`).
     """
 
     cos: Floats
@@ -149,8 +147,8 @@ class _Carrier:
 
     @classmethod
     def of(cls, omega: float, tau: Floats, device: Device) -> _Carrier:
-        gain, lead = hold_inverse(omega, device.tau_per_s / device.amplifier.rate_hz)
-        return cls(np.cos(omega * tau), np.sin(omega * tau), gain, lead / device.tau_per_s)
+        hold = FirstOrderHold.of(omega, device.tau_per_s / device.amplifier.rate_hz)
+        return cls(np.cos(omega * tau), np.sin(omega * tau), hold.gain, hold.lead / device.tau_per_s)
 
 
 def _ramp_samples(ramp: Ramp | None, since_s: Floats) -> int:

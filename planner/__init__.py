@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .drive import FirstOrderHold, curve
 from .errors import ContrastError, DwellTooShort, PlanError, SceneDoesNotFit
 from .operating_point import Margins, OperatingPoint, Tone
 from .plan import FramePlan, Plan, Ramp, ToneRamp
@@ -38,6 +39,7 @@ __all__ = [
     "Choice",
     "ContrastError",
     "DwellTooShort",
+    "FirstOrderHold",
     "FramePlan",
     "FrameSpread",
     "HigherMode",
@@ -74,6 +76,7 @@ __all__ = [
     "accuracy_needed",
     "assumed",
     "climb",
+    "curve",
     "fit_chain",
     "front_of",
     "pareto_of",

@@ -16,13 +16,14 @@ from dotwave.verify import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, plane_wave
 from planner import Plan, Ramp, plan_scene
+from planner.drive import smooth_step
 from planner.operating_point import OperatingPoint
 from planner.targets import WaveTarget, targets_of
 from planner.transitions.check import SAMPLES_PER_PERIOD, Orbit, Way, travel
 from planner.transitions.fall import CALM, find_fall
 from planner.transitions.limits import WayLimits
 from planner.transitions.rise import orbit_of
-from planner.transitions.steering import LinkCourse, Steering, rest, smooth_step
+from planner.transitions.steering import LinkCourse, Steering, rest
 from planner.waves.wave_state import wave_state
 
 Floats = NDArray[np.float64]
@@ -148,7 +149,7 @@ def test_steering_from_one_motion_to_another_begins_and_ends_with_their_drives_a
     np.testing.assert_allclose(lam, [start.lam, np.full(5, 0.05), held.lam])
     lam, _ = task.links.at(ends, rest(held.lam, 1.0), held)
     np.testing.assert_allclose(lam, [np.full(5, 0.05), np.full(5, 0.05), held.lam])
-    assert smooth_step(ends)[0].tolist() == [0.0, 0.5, 1.0]
+    assert smooth_step(ends).value.tolist() == [0.0, 0.5, 1.0]
 
 
 def shown(device: Device, patterns: list[TargetPattern], dwell_s: float, folder: Path) -> list[float]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..drive import smooth_step
 from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way, travel
@@ -22,7 +23,7 @@ from .limits import WayLimits, checked
 from .rise import orbit_of, ramp_of
 from .search import MET, MOST_PERIODS, STANDS, Search
 from .slow_flow import Course, follow_course
-from .steering import Steering, rest, smooth_step
+from .steering import Steering, rest
 
 __all__ = ["find_fall"]
 
@@ -106,7 +107,7 @@ def _let_go(held: OperatingPoint, omega: float, limits: WayLimits, wait: float) 
     """Drive and links taken away, and so long a wait (tau) after it."""
     length = 2 * math.pi / omega * PERIODS
     x = np.linspace(0.0, 1.0, 4 * PERIODS + 1)
-    step, slope = smooth_step(x)
+    step, slope, _ = smooth_step(x)
     open_to = held.lam if limits.lam_scope == "fixed" else np.full_like(held.lam, limits.lam_min)
     lam = held.lam + (open_to - held.lam) * step[:, None]
     drive, drive_slope = np.asarray(held.epsilon * (1 - step)), np.asarray(-held.epsilon * slope / length)

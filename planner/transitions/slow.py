@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device
 
+from ..drive import FirstOrderHold, felt, play, smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 
-__all__ = ["SAMPLES", "STAYS", "felt_envelope", "slow_fall", "slow_rise"]
+__all__ = ["SAMPLES", "STAYS", "slow_fall", "slow_rise"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -47,16 +48,12 @@ def slow_rise(device: Device, point: OperatingPoint, tolerance: float) -> Ramp:
     return _rise_ramp(device, point, rise * efold, settled, "")
 
 
-def _step(x: Floats) -> Floats:
-    return np.asarray(x**3 * (10 - 15 * x + 6 * x**2))
-
-
 def _rise_ramp(device: Device, point: OperatingPoint, rise: float, end: float, lacking: str) -> Ramp:
     x = np.linspace(0.0, 1.0, NODES)
     # After the rise the drive stands still while the motion comes to stand.
     tau = np.append(x * rise, max(end, rise * (1 + 1e-9)))
-    step = np.append(_step(x), 1.0)
-    slope = np.append(30 * (x * (1 - x)) ** 2, 0.0) / rise * device.tau_per_s
+    size = smooth_step(x)
+    step, slope = np.append(size.value, 1.0), np.append(size.slope, 0.0) / rise * device.tau_per_s
     first, *others = [_tone_ramp(tone, step, slope) for tone in point.every_tone]
     return Ramp(tau / device.tau_per_s, first.epsilon, first.epsilon_slope, lacking=lacking, tones=tuple(others))
 
@@ -71,29 +68,17 @@ def _settled(device: Device, point: OperatingPoint, rise: float, tolerance: floa
     dtau = 2 * math.pi / omega / SAMPLES
     periods = math.ceil((rise + _wait(device, point)) / (dtau * SAMPLES))
     tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
-    size = _step(np.minimum(tau / rise, 1.0))
-    force = np.zeros((len(tau), 1, device.chain_length))
+    size = smooth_step(tau / rise)
+    force = np.zeros((len(tau), 1))
     for tone in point.every_tone:
-        # Straight lines between samples pass a carrier with sinc^2.
-        half = tone.omega * dtau / 2
-        force[:, 0, 0] += size * (tone.epsilon * np.exp(1j * tone.omega * tau)).real * (half / math.sin(half)) ** 2
-    lam = np.concatenate([point.lam[:1], point.lam])[None, :]
-    ring = device.coupling.closure is Closure.RING
-    chain = device.chain
-    # Imported here: it needs a compiler.
-    from chainsim import GridIntegrator
-
-    grid = GridIntegrator(
-        shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
-        ring=ring, dtau=dtau,
-    )  # fmt: skip
-    z = grid.advance(force, lam)[:, 0]
-    felt = felt_envelope(z, omega, tau)
-    wanted = np.zeros_like(z)
+        kept = FirstOrderHold.of(tone.omega, dtau).passed
+        force[:, 0] += size.value * (tone.epsilon * np.exp(1j * tone.omega * tau)).real / kept
+    z = play(device.chain, dtau, force, np.concatenate([point.lam[:1], point.lam]))[:, 0]
+    carrier, wanted = np.exp(1j * omega * tau)[:, None], np.zeros_like(z)
     for tone in point.every_tone:
         wanted += (np.exp(1j * tone.omega * tau)[:, None] * tone.phasor).real
     scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
-    away = np.abs(np.subtract(felt, felt_envelope(wanted, omega, tau))).max(axis=1)
+    away = np.abs(felt(z, carrier, SAMPLES) - felt(wanted, carrier, SAMPLES)).max(axis=1)
     bad = np.flatnonzero(~(away <= tolerance * scale))
     last = int(bad[-1]) + 1 if len(bad) else 0
     return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
@@ -107,12 +92,6 @@ def _wait(device: Device, point: OperatingPoint) -> float:
     return -WAIT * 2 * math.pi / point.omega / math.log(multiplier)
 
 
-def felt_envelope(z: Floats, omega: float, tau: Floats) -> Complexes:
-    """First harmonic in each period; complex128, shape (periods, n)."""
-    turned = z * np.exp(-1j * omega * tau)[:, None]
-    return np.asarray(2 * turned.reshape(-1, SAMPLES, z.shape[1]).mean(axis=1))
-
-
 def slow_fall(device: Device, point: OperatingPoint, opens: bool) -> Ramp:
     """The drive is taken away, the links are opened where they may be, and the motion dies away by itself.
 
@@ -120,9 +99,10 @@ def slow_fall(device: Device, point: OperatingPoint, opens: bool) -> Ramp:
     """
     length = 2 * math.pi * FALL_PERIODS
     x = np.linspace(0.0, 1.0, NODES)
-    lam = point.lam + ((device.coupling.lam.min if opens else point.lam) - point.lam) * _step(x)[:, None]
+    step = smooth_step(x)
+    lam = point.lam + ((device.coupling.lam.min if opens else point.lam) - point.lam) * step.value[:, None]
     end = length + _dying(device, lam[-1])
-    still, slope = 1 - _step(x), -30 * (x * (1 - x)) ** 2 / length * device.tau_per_s
+    still, slope = 1 - step.value, -step.slope / length * device.tau_per_s
     still, slope, lam = np.append(still, 0.0), np.append(slope, 0.0), np.vstack([lam, lam[-1:]])
     t_s = np.append(x * length, end) / device.tau_per_s
     moves = opens and lam.size > 0

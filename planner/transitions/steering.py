@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..drive import smooth_step
 from ..operating_point import OperatingPoint
 from .slow_flow import Course, follow_course
 
-__all__ = ["LinkCourse", "Steering", "rest", "smooth_step"]
+__all__ = ["LinkCourse", "Steering", "rest"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -57,17 +58,11 @@ class LinkCourse:
         value, slope = np.full((len(x), len(held.lam)), self.top), np.zeros((len(x), len(held.lam)))
         for end, place, way in ((start, x / self.share, -1.0), (held, (x - 1) / self.share + 1, 1.0)):
             if not end.resting:
-                step, rise = smooth_step(place)
+                step, rise, _ = smooth_step(place)
                 share = step if way > 0 else 1 - step
                 value += (end.lam - self.top) * share[:, None]
                 slope += (end.lam - self.top) * way * rise[:, None] / self.share
         return value, slope
-
-
-def smooth_step(x: Floats) -> tuple[Floats, Floats]:
-    """The C^2 step from 0 at x <= 0 to 1 at x >= 1, and its derivative."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * (1 - x) ** 2
 
 
 def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
@@ -136,7 +131,7 @@ class Steering:
         half = self.size // 2
         factors = self.unit * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
         value, slope = splines(x, self.intervals)
-        step, step_slope = smooth_step(x)
+        step, step_slope, _ = smooth_step(x)
         last, angle = self.held.epsilon, 1j * (self.start.omega - self.omega) * self.duration
         first = self.start.epsilon * np.exp(angle * x)
         steady, steady_slope = first + (last - first) * step, (last - first) * step_slope + angle * first * (1 - step)
@@ -155,7 +150,7 @@ class Steering:
         """Squares of amplitudes between those of the ends; rest has none to lend."""
         ends = [self.held if one.resting else one for one in (self.start, self.held)]
         first, last = (np.abs((self.start if one.resting else one).phasor) ** 2 for one in ends)
-        return np.asarray(first + (last - first) * smooth_step(x)[0][:, None])
+        return np.asarray(first + (last - first) * smooth_step(x).value[:, None])
 
     def misses(self, unknowns: Floats, softness: float) -> tuple[Floats, Floats]:
         """By how much the end is missed, shape (P, 2 n), and movement and effort, shape (P, S)."""

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
+from ..drive import FirstOrderHold, felt, play, smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
 from .hermite import broken_line
 from .limits import WayLimits
 from .search import COMING_DOWN, MET, NODES_PER_INTERVAL, PIECE_S, STRONG
-from .slow import SAMPLES, STAYS, felt_envelope
-from .steering import LinkCourse, Steering, rest, smooth_step
+from .slow import SAMPLES, STAYS
+from .steering import LinkCourse, Steering, rest
 
 __all__ = ["quick_rise"]
 
@@ -53,7 +54,7 @@ def quick_rise(device: Device, point: OperatingPoint, limits: WayLimits, toleran
         return None
     task = tasks[0]
     x = np.linspace(0.0, 1.0, NODES_PER_INTERVAL * task.intervals + 1)
-    step, step_slope = smooth_step(x)
+    step, step_slope, _ = smooth_step(x)
     own = dict(zip((tone.omega for tone in mains), zip(tasks, steered, strict=True), strict=True))
     tones = []
     for tone in point.every_tone:
@@ -123,21 +124,18 @@ def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLim
     for link in range(n - 1):
         lam[:, 0, link + 1] = np.interp(tau, way.lam_tau, way.lam[:, link])
     envelopes = [way.envelope(tone, tau) for tone in way.tones]
-    last = 0
+    carrier, last = np.exp(1j * omega * tau)[:, None], 0
     for beat in BEATS:
-        force, wanted = np.zeros((len(tau), 1, n)), np.zeros((len(tau), n))
+        force, wanted = np.zeros((len(tau), 1)), np.zeros((len(tau), n))
         for tone, envelope in zip(point.every_tone, envelopes, strict=True):
             turning = np.exp(1j * (tone.omega * tau + 2 * math.pi * beat * round((tone.omega - omega) / gap)))
-            # Straight lines between samples pass a carrier with sinc^2.
-            half = tone.omega * dtau / 2
-            force[:, 0, 0] += (envelope * turning).real * (half / math.sin(half)) ** 2
+            force[:, 0] += (envelope * turning).real / FirstOrderHold.of(tone.omega, dtau).passed
             wanted += (turning[:, None] * tone.phasor).real
-        grid = GridIntegrator(shape=(1, n), chain_length=n, delta=device.delta, beta=device.beta, ring=False, dtau=dtau)
-        z = grid.advance(force, lam)[:, 0]
+        z = play(device.chain, dtau, force, lam)[:, 0]
         if not np.abs(z).max() <= limits.hilltop(device.chain):
             return None
         scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
-        away = np.abs(felt_envelope(z, omega, tau) - felt_envelope(wanted, omega, tau)).max(axis=1)
+        away = np.abs(felt(z, carrier, SAMPLES) - felt(wanted, carrier, SAMPLES)).max(axis=1)
         bad = np.flatnonzero(~(away <= tolerance * scale))
         last = max(last, int(bad[-1]) + 1 if len(bad) else 0)
     return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
