@@ -113,7 +113,6 @@ class _Played:
 
 def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good at every place of the beat; None where it does not."""
-    from chainsim import GridIntegrator
 
     n, omega = device.chain_length, point.omega
     dtau = 2 * math.pi / omega / SAMPLES
