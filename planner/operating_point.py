@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,7 @@ class OperatingPoint:
     lam: Floats
     omega: float
     phasor: Complexes = field(default_factory=_no_motion)
+    _: KW_ONLY
     mean: Floats = field(default_factory=_no_numbers)
     bias: Floats = field(default_factory=_no_numbers)
     tones: tuple[Tone, ...] = ()

@@ -12,7 +12,7 @@ from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, l
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
 from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
-from planner import FramePlan, Margins, OperatingPoint, Spread, Tone, plan_scene, spread_of
+from planner import FramePlan, OperatingPoint, Spread, Tone, plan_scene, spread_of
 from planner.analysis.effects import Linearisation
 from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
@@ -36,8 +36,8 @@ def held(device, setting, *, phase=None):
     drive = complex(setting.epsilon[0] * np.exp(1j * setting.phase[0]))
     felt = response.phasor[0] if drive else np.zeros(device.chain_length, complex)
     return OperatingPoint(
-        np.abs(felt + response.mean[0]) / device.full_scale, drive, setting.lam[0, 1:], setting.bias[0],
-        float(setting.omega[0]), felt, response.mean[0], 0.0, Margins(0.0, 0.0), Outcome.OK, phase,
+        drive, setting.lam[0, 1:], float(setting.omega[0]), felt, mean=response.mean[0], bias=setting.bias[0],
+        target=np.abs(felt + response.mean[0]) / device.full_scale, phase=phase,
     )  # fmt: skip
 
 
