@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .drive import FirstOrderHold, curve
+from .drive import DriveTone, FirstOrderHold, curve, links_at, tones_of
 from .errors import ContrastError, DwellTooShort, PlanError, SceneDoesNotFit
 from .operating_point import Margins, OperatingPoint, Tone
 from .plan import FramePlan, Plan, Ramp, ToneRamp
@@ -38,6 +38,7 @@ __all__ = [
     "ChainFit",
     "Choice",
     "ContrastError",
+    "DriveTone",
     "DwellTooShort",
     "FirstOrderHold",
     "FramePlan",
@@ -79,6 +80,7 @@ __all__ = [
     "curve",
     "fit_chain",
     "front_of",
+    "links_at",
     "pareto_of",
     "plan_scene",
     "questions_of",
@@ -86,6 +88,7 @@ __all__ = [
     "robust_plan",
     "seconds_words",
     "spread_of",
+    "tones_of",
     "trade_off",
     "walking_rate_hz",
     "wish_of",

@@ -17,7 +17,7 @@ from encoders import TargetPattern
 
 from ..amplitudes.floor import LOWER, idle_profiles
 from ..closed_forms.links import detuning_gain, links_for
-from ..drive import FirstOrderHold, cubic, cubic_slope, felt, play
+from ..drive import FirstOrderHold, cubic, cubic_slope, felt, full_motion
 from ..operating_point import OperatingPoint
 from ..transitions.envelopes import EnvelopeRamp, change, rise
 from .effects import Linearisation
@@ -156,7 +156,7 @@ class _Candidates:
                 drive = tau, nodes, way.epsilon[p], way.epsilon_slope[p]
                 force[:, at * count + p] = (hold.raised(cubic(*drive), cubic_slope(*drive)) * carrier).real
         lam = np.tile(np.pad(self.lam, ((0, 0), (1, 0))), (len(ways), 1))
-        z = play(chain, dtau, force, lam).reshape(len(tau), len(ways), count, chain.n)
+        z = full_motion(chain, dtau, force, lam).reshape(len(tau), len(ways), count, chain.n)
         after = []
         for at, end in enumerate(ends):
             late = slice(end, end + LOOKED_AT * SAMPLES_PER_PERIOD)

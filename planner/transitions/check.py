@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from ..drive import FirstOrderHold, cubic, cubic_slope, felt, play, smooth_step
+from ..drive import FirstOrderHold, cubic, cubic_slope, felt, full_motion, smooth_step
 
 __all__ = ["Orbit", "Passage", "Way", "travel"]
 
@@ -94,6 +94,7 @@ class Orbit:
         length = count * dtau
         x = np.arange(count) / count
         step, _, bend = smooth_step(x)
+        # Multiplied in this order: what a stop magnifies is the last digit too.
         slope = 30 * (x * (1 - x)) ** 2
         rate = 1j * self.omega * np.arange(1, len(self.harmonics) + 1)
         turning = np.exp(rate * (x[:, None] - 1) * length + rate / self.omega * phase)
@@ -138,6 +139,6 @@ def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: i
     if start is not None:
         forces = np.stack([start.prelude(chain, dtau, phase) for phase in phases], axis=1)
         before = forces / FirstOrderHold.of(start.omega, dtau).passed, np.concatenate([[0.0], start.lam])
-    z = play(chain, dtau, (envelope[:, None] * carrier).real, lam, before=before)
+    z = full_motion(chain, dtau, (envelope[:, None] * carrier).real, lam, before=before)
     after = felt(z[steps:], carrier[steps:, :, None], SAMPLES_PER_PERIOD)
     return Passage(after.transpose(1, 0, 2), float(np.abs(z).max()))

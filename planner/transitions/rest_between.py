@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..drive import FirstOrderHold, cubic, felt, play
+from ..drive import FirstOrderHold, felt, play
 from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import SAMPLES_PER_PERIOD as SAMPLES
@@ -55,14 +55,8 @@ def _missed(device: Device, before: OperatingPoint, after: OperatingPoint, ramp:
     steps = math.ceil(ramp.duration_s * device.tau_per_s / dtau)
     watched = math.ceil(WATCHED * 2 / device.delta / dtau / SAMPLES)
     tau = np.arange(steps + watched * SAMPLES, dtype=np.float64) * dtau
-    lam = np.zeros((len(tau), 1, device.chain_length))
-    lam[:, 0, 1:] = after.lam
-    if ramp.lam is not None and ramp.lam_t_s is not None:
-        for link, course in enumerate(ramp.lam.T):
-            lam[:steps, 0, link + 1] = np.interp(tau[:steps] / device.tau_per_s, ramp.lam_t_s, course)
-    force = _drive(device, after, ramp, tau, dtau)[:, None]
-    ahead = _prelude(device, before, dtau)[:, None, :], np.concatenate([[0.0], before.lam])
-    z = play(device.chain, dtau, force, lam, before=ahead)[steps:, 0]
+    ahead = _prelude(device, before, dtau), before.lam
+    z = play(device, after, ramp, tau, ahead=ahead)[steps:]
     carrier = np.exp(1j * after.omega * tau[steps:, None])
     away = np.abs(felt(z, carrier, SAMPLES) - after.phasor).max() / np.abs(after.phasor).max()
     return float(away) if np.isfinite(away) else math.inf
@@ -72,20 +66,3 @@ def _prelude(device: Device, held: OperatingPoint, dtau: float) -> Floats:
     """Forces on every actuator that lead from rest to a motion at tau = 0, up to the sample before it."""
     orbit = orbit_of(device.chain, held)[0] or Orbit(held.phasor[None, :], held.lam, held.omega)
     return orbit.prelude(device.chain, dtau, 0.0) / FirstOrderHold.of(held.omega, dtau).passed
-
-
-def _drive(device: Device, after: OperatingPoint, ramp: Ramp, tau: Floats, dtau: float) -> Floats:
-    """The drive's force on the way and after it."""
-    t_s = tau / device.tau_per_s
-    on_way = t_s < ramp.duration_s
-    force = np.zeros(len(tau))
-    tones = [(after.omega, ramp.epsilon, ramp.epsilon_slope, after.epsilon)]
-    tones += [(tone.omega, tone.epsilon, tone.epsilon_slope, 0j) for tone in ramp.tones]
-    for omega, values, slopes, last in tones:
-        envelope = np.where(on_way, 0j, last)
-        tilt = np.zeros(len(tau), dtype=np.complex128)
-        if values is not None and slopes is not None:
-            envelope[on_way] = cubic(t_s[on_way], ramp.t_s, values, slopes)
-            tilt[on_way] = np.interp(t_s[on_way], ramp.t_s, slopes) / device.tau_per_s
-        force += (FirstOrderHold.of(omega, dtau).raised(envelope, tilt) * np.exp(1j * omega * tau)).real
-    return force

@@ -6,17 +6,18 @@ For motions nothing quicker is known for: rings, waves of several tones, and wav
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device
 
-from ..drive import FirstOrderHold, felt, play, smooth_step
+from ..drive import felt, play, smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 
-__all__ = ["SAMPLES", "STAYS", "slow_fall", "slow_rise"]
+__all__ = ["SAMPLES", "STAYS", "Watched", "periods_in", "settled", "slow_fall", "slow_rise", "watched"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -40,12 +41,12 @@ def slow_rise(device: Device, point: OperatingPoint, tolerance: float) -> Ramp:
     """
     efold = 2 / device.delta
     found = [(rise, _settled(device, point, rise * efold, tolerance)) for rise in RISES]
-    known = [(settled, rise) for rise, settled in found if settled is not None]
+    known = [(end, rise) for rise, end in found if end is not None]
     if not known:
         lacking = "the motion does not come to stand from rest; it lacks damping, or a lam that can move on the way"
         return _rise_ramp(device, point, RISES[-1] * efold, RISES[-1] * efold, lacking)
-    settled, rise = min(known)
-    return _rise_ramp(device, point, rise * efold, settled, "")
+    end, rise = min(known)
+    return _rise_ramp(device, point, rise * efold, end, "")
 
 
 def _rise_ramp(device: Device, point: OperatingPoint, rise: float, end: float, lacking: str) -> Ramp:
@@ -64,24 +65,52 @@ def _tone_ramp(tone: Tone, size: Floats, slope: Floats) -> ToneRamp:
 
 def _settled(device: Device, point: OperatingPoint, rise: float, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good; None where it does not."""
-    omega = point.omega
-    dtau = 2 * math.pi / omega / SAMPLES
-    periods = math.ceil((rise + _wait(device, point)) / (dtau * SAMPLES))
-    tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
-    size = smooth_step(tau / rise)
-    force = np.zeros((len(tau), 1))
+    periods = periods_in(rise + _wait(device, point), point.omega)
+    seen = watched(device, point, _rise_ramp(device, point, rise, rise, ""), periods)
+    return settled(seen.restless(tolerance), periods, point.omega)
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What comes of a ramp.
+
+    Attributes
+    ----------
+    away : float64, shape (periods,), worst deviation from the point, relative to its largest amplitudes together.
+    peak : largest |z| of all.
+    """
+
+    away: Floats
+    peak: float
+
+    def restless(self, tolerance: float) -> int:
+        """Periods until the motion stands for good."""
+        bad = np.flatnonzero(~(self.away <= tolerance))
+        return int(bad[-1]) + 1 if len(bad) else 0
+
+
+def periods_in(tau: float, omega: float) -> int:
+    """Whole periods that cover a time."""
+    return math.ceil(tau / (2 * math.pi / omega / SAMPLES * SAMPLES))
+
+
+def settled(restless: int, periods: int, omega: float) -> float | None:
+    """The end, in tau, of the first period that stands; None where that is too late in those that were watched."""
+    last = ((restless + 1) * SAMPLES - 1) * (2 * math.pi / omega / SAMPLES)
+    return last if restless < (1 - STAYS) * periods else None
+
+
+def watched(device: Device, point: OperatingPoint, ramp: Ramp, periods: int, start: float = 0.0) -> Watched:
+    """Follow a ramp from rest in the full equations; `start` : of the ramp, tau from that of the whole plan."""
+    tau = np.arange(periods * SAMPLES, dtype=np.float64) * (2 * math.pi / point.omega / SAMPLES)
+    z = play(device, point, ramp, tau, start=start)
+    turning = {tone.omega: np.exp(1j * tone.omega * (start + tau))[:, None] for tone in point.every_tone}
+    wanted = np.zeros_like(z)
     for tone in point.every_tone:
-        kept = FirstOrderHold.of(tone.omega, dtau).passed
-        force[:, 0] += size.value * (tone.epsilon * np.exp(1j * tone.omega * tau)).real / kept
-    z = play(device.chain, dtau, force, np.concatenate([point.lam[:1], point.lam]))[:, 0]
-    carrier, wanted = np.exp(1j * omega * tau)[:, None], np.zeros_like(z)
-    for tone in point.every_tone:
-        wanted += (np.exp(1j * tone.omega * tau)[:, None] * tone.phasor).real
+        wanted += (turning[tone.omega] * tone.phasor).real
     scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
-    away = np.abs(felt(z, carrier, SAMPLES) - felt(wanted, carrier, SAMPLES)).max(axis=1)
-    bad = np.flatnonzero(~(away <= tolerance * scale))
-    last = int(bad[-1]) + 1 if len(bad) else 0
-    return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
+    ours, theirs = (felt(motion, turning[point.omega], SAMPLES) for motion in (z, wanted))
+    return Watched(np.abs(ours - theirs).max(axis=1) / scale, float(np.abs(z).max()))
 
 
 def _wait(device: Device, point: OperatingPoint) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..drive import FirstOrderHold, felt, play, smooth_step
+from ..drive import FirstOrderHold, felt, full_motion, smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
@@ -130,7 +130,7 @@ def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLim
             turning = np.exp(1j * (tone.omega * tau + 2 * math.pi * beat * round((tone.omega - omega) / gap)))
             force[:, 0] += (envelope * turning).real / FirstOrderHold.of(tone.omega, dtau).passed
             wanted += (turning[:, None] * tone.phasor).real
-        z = play(device.chain, dtau, force, lam)[:, 0]
+        z = full_motion(device.chain, dtau, force, lam)[:, 0]
         if not np.abs(z).max() <= limits.hilltop(device.chain):
             return None
         scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
