@@ -17,7 +17,7 @@ from ..drive import felt, play, smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 
-__all__ = ["SAMPLES", "STAYS", "Watched", "periods_in", "settled", "slow_fall", "slow_rise", "watched"]
+__all__ = ["Watched", "periods_in", "settled", "slow_fall", "slow_rise", "watched"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -7,21 +7,22 @@ come to stand by and by, which is followed in the full equations for several pla
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..drive import FirstOrderHold, felt, full_motion, smooth_step
+from ..drive import smooth_step
 from ..operating_point import OperatingPoint, Tone
 from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
 from .hermite import broken_line
+from .joining import as_tone
 from .limits import WayLimits
 from .search import COMING_DOWN, MET, NODES_PER_INTERVAL, PIECE_S, STRONG
-from .slow import SAMPLES, STAYS
+from .slow import periods_in, settled, watched
 from .steering import LinkCourse, Steering, rest
 
 __all__ = ["quick_rise"]
@@ -47,6 +48,16 @@ class _OneOfTwo(Steering):
 
 def quick_rise(device: Device, point: OperatingPoint, limits: WayLimits, tolerance: float) -> Ramp | None:
     """The way, or None where it is none within the limits; `tolerance` relative to the largest amplitude."""
+    way = _steered(device, point, limits)
+    stands = None if way is None else _settled(device, point, way, limits, tolerance)
+    if way is None or stands is None or _too_strong(way, limits, device.tau_per_s, point.omega):
+        return None
+    # The drive stands still while the motion comes to stand.
+    return replace(way, t_s=np.append(way.t_s[:-1], max(stands / device.tau_per_s, way.duration_s)))
+
+
+def _steered(device: Device, point: OperatingPoint, limits: WayLimits) -> Ramp | None:
+    """Each tone on its way alone, then for an instant as it stays; None where one does not arrive."""
     mains = [tone for tone in point.every_tone if not tone.side]
     tasks = [_task(device, point, mains[k], mains[1 - k], limits) for k in (0, 1)]
     steered = [steer(task, np.zeros(task.size), 0.0, STEPS) for task in tasks]
@@ -69,13 +80,8 @@ def quick_rise(device: Device, point: OperatingPoint, limits: WayLimits, toleran
     pieces = max(8, math.ceil(task.duration / device.tau_per_s / PIECE_S))
     lam = np.clip(broken_line(links[None], links_slope[None], pieces)[0], limits.lam_min, links.max())
     tau, lam_tau = x * task.duration, np.linspace(0.0, task.duration, pieces + 1)
-    settled = _settled(device, point, _Played(tau, lam_tau, lam, tuple(tones)), limits, tolerance)
-    if settled is None or _too_strong(tones, limits, device.tau_per_s):
-        return None
-    t_s = np.append(tau, max(settled, tau[-1] * (1 + 1e-9))) / device.tau_per_s
-    return Ramp(
-        t_s, first.epsilon, first.epsilon_slope, lam_t_s=lam_tau / device.tau_per_s, lam=lam, tones=tuple(others)
-    )
+    t_s, lam_t_s = np.append(tau, tau[-1] * (1 + 1e-9)) / device.tau_per_s, lam_tau / device.tau_per_s
+    return Ramp(t_s, first.epsilon, first.epsilon_slope, lam_t_s=lam_t_s, lam=lam, tones=tuple(others))
 
 
 def _task(device: Device, point: OperatingPoint, tone: Tone, other: Tone, limits: WayLimits) -> _OneOfTwo:
@@ -86,55 +92,24 @@ def _task(device: Device, point: OperatingPoint, tone: Tone, other: Tone, limits
     return _OneOfTwo(device.chain, tone.omega, rest(point.lam, tone.omega), end, links, duration, other.phasor)
 
 
-def _too_strong(tones: list[ToneRamp], limits: WayLimits, tau_per_s: float) -> bool:
+def _too_strong(way: Ramp, limits: WayLimits, tau_per_s: float, omega: float) -> bool:
     """Whether the tones together take more than the amplifier gives."""
-    drive = np.sum([np.abs(tone.epsilon) for tone in tones], axis=0)
-    change = np.zeros(len(drive))
-    for tone in tones:
+    drive, change = np.zeros(len(way.t_s)), np.zeros(len(way.t_s))
+    for tone in as_tone(way, omega).tones:
         slope = 0.0 if tone.epsilon_slope is None else tone.epsilon_slope
+        drive += np.abs(tone.epsilon)
         change += np.abs(slope + 1j * tone.omega * tau_per_s * tone.epsilon)
     return bool(drive.max() > limits.epsilon_max or change.max() > limits.slew_per_s)
 
 
-@dataclass(frozen=True)
-class _Played:
-    """Drive nodes at `tau`, and one behind the end; links."""
-
-    tau: Floats
-    lam_tau: Floats
-    lam: Floats
-    tones: tuple[ToneRamp, ...]
-
-    def envelope(self, tone: ToneRamp, tau: Floats) -> Complexes:
-        """Of a tone at instants."""
-        here = np.interp(tau, self.tau, tone.epsilon[:-1].real) + 1j * np.interp(tau, self.tau, tone.epsilon[:-1].imag)
-        return np.where(tau < self.tau[-1], here, tone.epsilon[-1])
-
-
-def _settled(device: Device, point: OperatingPoint, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
+def _settled(device: Device, point: OperatingPoint, way: Ramp, limits: WayLimits, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good at every place of the beat; None where it does not."""
-
-    n, omega = device.chain_length, point.omega
-    dtau = 2 * math.pi / omega / SAMPLES
-    periods = math.ceil((float(way.tau[-1]) + WAIT * 2 / device.delta) / dtau / SAMPLES)
-    tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
+    omega, periods = point.omega, periods_in(way.duration_s * device.tau_per_s + WAIT * 2 / device.delta, point.omega)
     gap = next(tone.omega for tone in point.tones if not tone.side) - omega
-    lam = np.zeros((len(tau), 1, n))
-    for link in range(n - 1):
-        lam[:, 0, link + 1] = np.interp(tau, way.lam_tau, way.lam[:, link])
-    envelopes = [way.envelope(tone, tau) for tone in way.tones]
-    carrier, last = np.exp(1j * omega * tau)[:, None], 0
+    restless = 0
     for beat in BEATS:
-        force, wanted = np.zeros((len(tau), 1)), np.zeros((len(tau), n))
-        for tone, envelope in zip(point.every_tone, envelopes, strict=True):
-            turning = np.exp(1j * (tone.omega * tau + 2 * math.pi * beat * round((tone.omega - omega) / gap)))
-            force[:, 0] += (envelope * turning).real / FirstOrderHold.of(tone.omega, dtau).passed
-            wanted += (turning[:, None] * tone.phasor).real
-        z = full_motion(device.chain, dtau, force, lam)[:, 0]
-        if not np.abs(z).max() <= limits.hilltop(device.chain):
+        seen = watched(device, point, way, periods, beat * 2 * math.pi / abs(gap))
+        if not seen.peak <= limits.hilltop(device.chain):
             return None
-        scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
-        away = np.abs(felt(z, carrier, SAMPLES) - felt(wanted, carrier, SAMPLES)).max(axis=1)
-        bad = np.flatnonzero(~(away <= tolerance * scale))
-        last = max(last, int(bad[-1]) + 1 if len(bad) else 0)
-    return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
+        restless = max(restless, seen.restless(tolerance))
+    return settled(restless, periods, omega)
