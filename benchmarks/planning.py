@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
 from encoders import Frame, GridShape, Scene, levels
-from planner import FramePlan, Spread, plan_scene, seconds_words, spread_of
+from planner import FramePlan, RelativeSpread, plan_scene, seconds_words, spread_of
 from planner.families import family_of, row_of
 from planner.family import AmplitudeFamily
 from planner.targets import AmplitudeTarget
 
 KEPT = Path(__file__).resolve().parent / "results" / "planning.json"
-SEED, CONTRAST_DB, SPREAD = 0, 20.0, Spread(f0=0.01)
+SEED, CONTRAST_DB, SPREAD = 0, 20.0, RelativeSpread(f0=0.01)
 # What is looked at only once the code and its tables are in memory.
 WARM = 3
 

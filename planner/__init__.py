@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from .drive import DriveTone, FirstOrderHold, curve, links_at, tones_of
 from .errors import ContrastError, DwellTooShort, PlanError, SceneDoesNotFit
-from .operating_point import Margins, OperatingPoint, Tone
+from .operating_point import Margins, OperatingPoint, PointTone
 from .plan import FramePlan, Plan, Ramp, ToneRamp
 from .scene_plan import DEFAULT_CONTRAST_DB, plan_scene
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .analysis.pareto import ParetoError, ParetoFront, ParetoPoint, front_of, pareto_of
     from .analysis.questions import Question, TradeoffError, questions_of, seconds_words
     from .analysis.requirement import Requirement, RequirementError, Term, require
-    from .analysis.tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
+    from .analysis.tradeoff import Tradeoff, TradeoffChoice, TradeoffRow, trade_off
     from .identification.calibration import ChainFit, Sweep, SweepError, fit_chain
     from .outlook import FrameSpread, TradePoint
     from .robustness.robust import (
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         accuracy_needed,
         robust_plan,
     )
-    from .robustness.spread import Spread, SpreadError, SpreadReport, Wish, spread_of, wish_of
+    from .robustness.spread import RelativeSpread, SpreadError, SpreadReport, Wish, spread_of, wish_of
     from .surroundings import HigherMode, Surroundings, assumed
     from .waves.walking import walking_rate_hz
 
@@ -36,7 +36,6 @@ __all__ = [
     "DEFAULT_CONTRAST_DB",
     "Accuracy",
     "ChainFit",
-    "Choice",
     "ContrastError",
     "DriveTone",
     "DwellTooShort",
@@ -51,25 +50,26 @@ __all__ = [
     "ParetoPoint",
     "Plan",
     "PlanError",
+    "PointTone",
     "Question",
     "Ramp",
+    "RelativeSpread",
     "Requirement",
     "RequirementError",
     "RobustError",
     "RobustPlan",
     "SceneDoesNotFit",
-    "Spread",
     "SpreadError",
     "SpreadReport",
     "Surroundings",
     "Sweep",
     "SweepError",
     "Term",
-    "Tone",
     "ToneRamp",
     "TradePoint",
     "TradeRow",
     "Tradeoff",
+    "TradeoffChoice",
     "TradeoffError",
     "TradeoffRow",
     "Trial",
@@ -106,7 +106,7 @@ _LATE = {
     "trade_off": "analysis.tradeoff",
     "TradeoffRow": "analysis.tradeoff",
     "Tradeoff": "analysis.tradeoff",
-    "Choice": "analysis.tradeoff",
+    "TradeoffChoice": "analysis.tradeoff",
     "climb": "analysis.climbing",
     "seconds_words": "analysis.questions",
     "questions_of": "analysis.questions",
@@ -123,7 +123,7 @@ _LATE = {
     "ChainFit": "identification.calibration",
     "RobustError": "robustness.robust",
     "RobustPlan": "robustness.robust",
-    "Spread": "robustness.spread",
+    "RelativeSpread": "robustness.spread",
     "SpreadError": "robustness.spread",
     "SpreadReport": "robustness.spread",
     "Sweep": "identification.calibration",

@@ -48,7 +48,7 @@ FAMILIES = (
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
-    Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walking"),
+    Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
     Row("wave", (WaveTarget, AmplitudeTarget), _any, ".waves.wave_state", "Waves"),
 )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Closure, Outcome, Setting
 
-__all__ = ["Margins", "OperatingPoint", "Tone", "setting_of"]
+__all__ = ["Margins", "OperatingPoint", "PointTone", "setting_of"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -40,7 +40,7 @@ class Margins:
 
 
 @dataclass(frozen=True)
-class Tone:
+class PointTone:
     """One more tone of a drive: force = Re(epsilon e^{i omega tau}), tau from the start of the whole plan.
 
     Attributes
@@ -97,7 +97,7 @@ class OperatingPoint:
     _: KW_ONLY
     mean: Floats = field(default_factory=_no_numbers)
     bias: Floats = field(default_factory=_no_numbers)
-    tones: tuple[Tone, ...] = ()
+    tones: tuple[PointTone, ...] = ()
     target: Floats = field(default_factory=_no_numbers)
     phase: Floats | None = None
     error: float = 0.0
@@ -116,9 +116,9 @@ class OperatingPoint:
         return not self.phasor.any()
 
     @property
-    def every_tone(self) -> tuple[Tone, ...]:
+    def every_tone(self) -> tuple[PointTone, ...]:
         """All tones of the drive, that at `omega` first."""
-        return (Tone(self.omega, self.epsilon, self.phasor), *self.tones)
+        return (PointTone(self.omega, self.epsilon, self.phasor), *self.tones)
 
 
 def setting_of(chain: Chain, points: Sequence[OperatingPoint]) -> Setting:

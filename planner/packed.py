@@ -12,7 +12,7 @@ import numpy as np
 
 from chainsim import Outcome
 
-from .operating_point import Margins, OperatingPoint, Tone
+from .operating_point import Margins, OperatingPoint, PointTone
 from .plan import Ramp, ToneRamp
 
 __all__ = ["packed", "unpacked"]
@@ -48,7 +48,7 @@ def _empty(header: bytes) -> np.ndarray[Any, Any]:
     return np.empty(shape, dtype)
 
 
-_PARTS = {kind.__name__: kind for kind in (OperatingPoint, Margins, Ramp, Tone, ToneRamp)}
+_PARTS = {kind.__name__: kind for kind in (OperatingPoint, Margins, Ramp, PointTone, ToneRamp)}
 
 
 def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:

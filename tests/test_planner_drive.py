@@ -15,7 +15,7 @@ from chainsim import Amplifier, Chain, Closure, Device, GridIntegrator, load_dev
 from drivers import Waveform
 from drivers.coupling import CouplingWriter, LamTrack
 from encoders import Frame, TargetPattern
-from planner import FirstOrderHold, FramePlan, OperatingPoint, Plan, Ramp, Tone, ToneRamp, links_at
+from planner import FirstOrderHold, FramePlan, OperatingPoint, Plan, PointTone, Ramp, ToneRamp, links_at
 from planner.drive import cubic, cubic_slope, curve, felt, full_motion, play, samples, smooth_step
 
 # Without a converter, whose steps would cover what is compared.
@@ -134,7 +134,7 @@ def test_what_is_written_are_the_samples_of_the_ramp(seed: int, omega: float) ->
     lam_t_s, lam = np.sort(rng.uniform(0.0, 0.03, 3)), rng.uniform(0.0, 0.01, (3, 2))
     lam_t_s[0] = 0.0
     ramp = Ramp(t_s, own.epsilon, own.epsilon_slope, lam_t_s=lam_t_s, lam=lam, tones=(other, fading))
-    tone = Tone(other.omega, 1e-3 * complex(values[-1, 1]), np.zeros(3, complex))
+    tone = PointTone(other.omega, 1e-3 * complex(values[-1, 1]), np.zeros(3, complex))
     point = OperatingPoint(
         1e-3 * complex(values[-1, 0]), rng.uniform(0.0, 0.01, 2), omega, np.zeros(3, complex),
         mean=np.zeros(3), bias=np.zeros(3), target=np.ones(3), tones=(tone,),

@@ -23,8 +23,8 @@ from planner.outlook import FrameSpread
 from planner.robustness import expected as expected_module
 from planner.robustness.expected import WANTED, Expectation
 from planner.robustness.robust_aim import aim_for
-from planner.robustness.robust_search import Search, Trial
-from planner.robustness.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
+from planner.robustness.robust_search import RobustSearch, Trial
+from planner.robustness.spread import THRESHOLD, TOLERANCE, RelativeSpread, Wish, drawn_in, judge, motion_of, wish_of
 from planner.targets import WalkingTarget
 from planner.waves.walking import walking_state
 
@@ -88,7 +88,7 @@ def test_a_frame_is_as_good_as_its_rows_drawn_together() -> None:
     memory = Memory(device, 20.0)
     held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
     there = [replace(state, target=one.levels) for one, state in zip(held, frame.states, strict=True)]
-    motion = motion_of(there, drawn_in(device, Spread(f0=0.01), range(6), count=1000, seed=0))
+    motion = motion_of(there, drawn_in(device, RelativeSpread(f0=0.01), range(6), count=1000, seed=0))
     report = judge(wish_of(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
     assert of(frame).expected == pytest.approx(report.expected, rel=1e-6)
     assert of(frame).yield_ == pytest.approx(report.yield_, abs=2e-3)
@@ -164,11 +164,11 @@ def settings(device: Device, amplitude: Floats, omega: float) -> OperatingPoint:
 
 def test_the_worst_of_several_copies_is_what_it_says() -> None:
     device = spread(LINKED).alone(0)
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.05), Spread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0)
+    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0)
     errors = np.random.default_rng(0).exponential(size=500)
-    assert Search(device, trial, trial.spread).worst_of(errors) == pytest.approx(errors.mean())
+    assert RobustSearch(device, trial, trial.spread).worst_of(errors) == pytest.approx(errors.mean())
     drawn = np.random.default_rng(1).choice(errors, (200_000, 4)).max(axis=1)
-    assert Search(device, trial, trial.spread, 4).worst_of(errors) == pytest.approx(drawn.mean(), rel=0.01)
+    assert RobustSearch(device, trial, trial.spread, 4).worst_of(errors) == pytest.approx(drawn.mean(), rel=0.01)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -176,8 +176,10 @@ def test_an_aim_is_never_worse_than_the_wish_on_fresh_draws(seed: int) -> None:
     device, omega = spread(LINKED).alone(0), 1.35
     target = np.random.default_rng(seed).choice([0.1, 1.0], 6)
     aim = aim_for(device, target, omega, 1)
-    trial = Trial(device.chain, Wish(target[None] + 0j, 0.05), Spread(f0=0.01), TOLERANCE, THRESHOLD, 2000, 99 + seed)
-    search = Search(device, trial, trial.spread)
+    trial = Trial(
+        device.chain, Wish(target[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 2000, 99 + seed
+    )
+    search = RobustSearch(device, trial, trial.spread)
     wished, aimed = (search.row(settings(device, one * 0.05, omega)).report.expected for one in (target, aim))
     assert aimed <= wished * 1.01
 

@@ -12,7 +12,7 @@ from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, l
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
 from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
-from planner import FramePlan, OperatingPoint, Spread, Tone, plan_scene, spread_of
+from planner import FramePlan, OperatingPoint, PointTone, RelativeSpread, plan_scene, spread_of
 from planner.analysis.effects import Linearisation
 from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
@@ -138,7 +138,7 @@ def random_surroundings(rng, device, force):
         preload=size(1e-5, 1e-1), hysteresis=size(1e-6, 1e-1), saturation=force * size(1e-2, 10),
         creep_per_decade=size(1e-6, 1e-1), creep_first_s=size(10, 100) / device.tau_per_s,
         modes=(HigherMode(4.965, 5 * device.delta, size(1e-6, 3)),), bandwidth_hz=device.f0_hz * size(1, 50),
-        spread=Spread(f0=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
+        spread=RelativeSpread(f0=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
     )  # fmt: skip
 
 
@@ -240,7 +240,12 @@ def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
 
 def test_spread_is_what_draws_scatter_by():
     device, state = vibrating(amplitude=0.05, device=device_of(4, rows=1))
-    for spread in (Spread(f0=1e-4), Spread(delta=1e-3), Spread(beta=1e-3), Spread(lam=1e-4)):
+    for spread in (
+        RelativeSpread(f0=1e-4),
+        RelativeSpread(delta=1e-3),
+        RelativeSpread(beta=1e-3),
+        RelativeSpread(lam=1e-4),
+    ):
         sigma = effects(device, [state], Surroundings(spread=spread))["spread"] / 2
         report = spread_of(device, [state], spread, tolerance=1.0, threshold=0.5, count=4000)
         worst = report.error * device.full_scale / np.abs(state.phasor).max()
@@ -317,7 +322,7 @@ def test_the_way_in_counts_for_half_of_its_time():
 def test_tones_and_what_they_add_up_to():
     device, first = vibrating(amplitude=0.03, lam=0.05, omega=0.95)
     _, second = vibrating(amplitude=0.03, lam=0.05, omega=1.12)
-    both = replace(first, tones=(Tone(second.omega, second.epsilon, second.phasor),))
+    both = replace(first, tones=(PointTone(second.omega, second.epsilon, second.phasor),))
     standing = Linearisation(device.chain, both)
     assert standing.size == pytest.approx(np.abs(first.phasor) + np.abs(second.phasor))
     for change, state in zip(standing.without_cubic(), (first, second), strict=True):

@@ -14,8 +14,8 @@ from planner.amplitudes.vibration import Vibration
 from planner.closed_forms.links import drive_for, links_for
 from planner.operating_point import OperatingPoint
 from planner.robustness.robust import RobustError, RobustPlan, Trial, accuracy_needed, robust_plan
-from planner.robustness.robust_search import Search
-from planner.robustness.spread import Spread, Wish, draw, spread_of
+from planner.robustness.robust_search import RobustSearch
+from planner.robustness.spread import RelativeSpread, Wish, draw, spread_of
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ DEVICE = load_device("linked-6x6")
 CHAIN = DEVICE.chain
 PROFILE = np.array([1, 1, 0.1, 0.1, 1, 1])
 WISH = Wish(PROFILE[None] + 0j, DEVICE.full_scale)
-TRIAL = Trial(CHAIN, WISH, Spread(f0=0.01), tolerance=0.2, threshold=0.5, count=1000, seed=0)
+TRIAL = Trial(CHAIN, WISH, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=1000, seed=0)
 WELL = 0.8
 
 
@@ -100,7 +100,7 @@ def test_fewer_volts_leave_less_robustness() -> None:
 @pytest.mark.parametrize("phase_matters", [False, True])
 def test_the_gradient_is_a_finite_difference(phase_matters: bool) -> None:
     wish = Wish(PROFILE[None] * np.exp(1j * np.arange(6)), DEVICE.full_scale, phase_matters)
-    search = Search(DEVICE, replace(TRIAL, wish=wish), Spread(f0=0.01, delta=0.1, beta=0.1, lam=0.05))
+    search = RobustSearch(DEVICE, replace(TRIAL, wish=wish), RelativeSpread(f0=0.01, delta=0.1, beta=0.1, lam=0.05))
     held = closed_form(1.2)
     x, h = np.array([*np.log([held.epsilon, *held.lam]), held.omega]), 1e-7
     _, found = search._expected(x, held)
@@ -109,7 +109,7 @@ def test_the_gradient_is_a_finite_difference(phase_matters: bool) -> None:
 
 
 def test_a_searched_setting_is_never_worse_on_its_own_draws() -> None:
-    search = Search(DEVICE, TRIAL, TRIAL.spread)
+    search = RobustSearch(DEVICE, TRIAL, TRIAL.spread)
     rng = np.random.default_rng(0)
     for _ in range(5):
         start = closed_form(rng.uniform(1.1, 1.35), rng.uniform(0.1, 1.0, 6))
@@ -121,7 +121,7 @@ def test_a_searched_setting_is_never_worse_on_its_own_draws() -> None:
 
 
 def test_without_spread_the_robust_setting_is_the_nominal_one() -> None:
-    trial = replace(TRIAL, spread=Spread())
+    trial = replace(TRIAL, spread=RelativeSpread())
     plan = robust_plan(DEVICE, trial, closed_form(1.3), well_share=WELL)
     assert plan.robust.nominal_error < 1e-12
     assert plan.robust.report.yield_ == 1.0
@@ -135,7 +135,7 @@ def test_a_measured_chain_is_planned_exactly() -> None:
             6, delta=CHAIN.delta * rng.uniform(0.8, 1.2, 6), beta=-rng.uniform(0.8, 1.2, 6),
             stiffness=(1 + 0.01 * rng.standard_normal(6)) ** 2,
         )  # fmt: skip
-        search = Search(DEVICE, replace(TRIAL, chain=chain, tolerance=0.01), Spread(f0=1e-4))
+        search = RobustSearch(DEVICE, replace(TRIAL, chain=chain, tolerance=0.01), RelativeSpread(f0=1e-4))
         blind, known = search.row(closed_form(1.35)), search.row(search.least(closed_form(1.35), free_omega=False))
         assert blind.report.yield_ == 0.0
         assert known.report.yield_ >= 0.98
@@ -152,7 +152,7 @@ def test_the_accuracy_needed_is_enough_and_hardly_more_is_not() -> None:
     assert found.row.report.yield_ >= 0.9
     fresh = replace(TRIAL, tolerance=0.1, seed=777)
     for factor, enough in ((0.9, True), (1.15, False)):
-        search = Search(DEVICE, fresh, found.spread.scaled(factor))
+        search = RobustSearch(DEVICE, fresh, found.spread.scaled(factor))
         rows = [search.row(held) for held in (nominal, found.row.point, search.least(nominal, free_omega=False))]
         assert (max(row.report.yield_ for row in rows) >= 0.9) is enough
 
@@ -167,7 +167,7 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
     epsilon = a * math.hypot(1 - omega2 + 0.75 * device.beta * a**2, device.delta * math.sqrt(omega2))
     nominal = OperatingPoint(epsilon, np.full(5, lam), math.sqrt(omega2))
     wish = Wish(np.exp(-1j * lag * np.arange(6))[None], a, phase_matters=True)
-    trial = Trial(device.chain, wish, Spread(f0=0.01), tolerance=0.2, threshold=0.5, count=400, seed=0)
+    trial = Trial(device.chain, wish, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=400, seed=0)
     plan = robust_plan(device, trial, nominal, well_share=WELL)
     assert plan.nominal.nominal_error < 1e-9
     assert plan.trade == ()
@@ -180,7 +180,7 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
 
 def test_no_accuracy_helps_a_setting_that_cannot_make_the_pattern() -> None:
     device = load_device("paper-6x6")
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.02), Spread(f0=0.01), 0.05, 0.5, count=50, seed=0)
+    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.02), RelativeSpread(f0=0.01), 0.05, 0.5, count=50, seed=0)
     found = accuracy_needed(device, trial, OperatingPoint(1e-4, np.full(5, 6e-3), 1.0), share=0.9)
     assert found.factor == 0.0
     assert found.row.report.yield_ < 0.9
@@ -190,7 +190,7 @@ def test_no_accuracy_helps_a_setting_that_cannot_make_the_pattern() -> None:
 
 def test_a_planned_state_is_judged_as_it_stands() -> None:
     state = Vibration(DEVICE, 20.0).states(PROFILE[None])[0]
-    row = Search(DEVICE, TRIAL, TRIAL.spread).row(state)
+    row = RobustSearch(DEVICE, TRIAL, TRIAL.spread).row(state)
     assert row.nominal_error < 1e-4
     frame = spread_of(DEVICE, [state], TRIAL.spread, tolerance=0.2, threshold=0.5, seed=TRIAL.seed + 1)
     np.testing.assert_allclose(row.report.error, frame.error, rtol=1e-12)

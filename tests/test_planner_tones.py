@@ -12,7 +12,7 @@ import pytest
 from chainsim import Outcome, load_device
 from drivers import Waveform, WaveformError, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, walking_bars
-from planner import ContrastError, FramePlan, Margins, OperatingPoint, Plan, Ramp, Tone, ToneRamp, plan_scene
+from planner import ContrastError, FramePlan, Margins, OperatingPoint, Plan, PointTone, Ramp, ToneRamp, plan_scene
 from planner.cache import PlanCache
 from planner.memory import MOST_STATES, Memory
 from planner.transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
@@ -23,7 +23,7 @@ GRID = GridShape(6, 6)
 FINE = SINGLE.model_copy(update={"amplifier": SINGLE.amplifier.model_copy(update={"rate_hz": 200_000})})
 
 
-def state(epsilon: complex = 0.01j, omega: float = 1.0, tones: tuple[Tone, ...] = ()) -> OperatingPoint:
+def state(epsilon: complex = 0.01j, omega: float = 1.0, tones: tuple[PointTone, ...] = ()) -> OperatingPoint:
     return OperatingPoint(
         target=np.ones(1), epsilon=epsilon, lam=np.zeros(0), bias=np.zeros(1), omega=omega,
         phasor=np.full(1, 0.05 + 0j), mean=np.zeros(1), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,
@@ -31,8 +31,8 @@ def state(epsilon: complex = 0.01j, omega: float = 1.0, tones: tuple[Tone, ...] 
     )  # fmt: skip
 
 
-def tone(omega: float, epsilon: complex) -> Tone:
-    return Tone(omega, epsilon, np.full(1, 0.02 + 0.01j))
+def tone(omega: float, epsilon: complex) -> PointTone:
+    return PointTone(omega, epsilon, np.full(1, 0.02 + 0.01j))
 
 
 def ramp(last: complex, *tones: ToneRamp) -> Ramp:

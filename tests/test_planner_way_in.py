@@ -19,7 +19,7 @@ from planner.plan import Ramp
 from planner.transitions.fall import find_fall
 from planner.transitions.limits import WayError, WayLimits
 from planner.transitions.rise import find_way
-from planner.transitions.search import Search
+from planner.transitions.search import RampSearch
 from planner.transitions.steering import LinkCourse, Steering, rest
 
 Floats = NDArray[np.float64]
@@ -234,7 +234,7 @@ def test_every_link_may_have_its_own_course() -> None:
 
 def test_the_budget_is_kept() -> None:
     omega, held = wave(120, 0.07)
-    search = Search(PAPER.chain, rest(held.lam, omega), held, omega, LIMITS, TAU_PER_S, 9)
+    search = RampSearch(PAPER.chain, rest(held.lam, omega), held, omega, LIMITS, TAU_PER_S, 9)
     assert search.shorter_and_shorter()
     assert search.spent <= 9
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Closure
 
-from ..operating_point import OperatingPoint
-from ..robustness.spread import Spread
+from ..operating_point import OperatingPoint, PointTone
+from ..robustness.spread import RelativeSpread
 from ..surroundings import HigherMode, Surroundings
 
-__all__ = ["Line", "Linearisation", "pattern_error"]
+__all__ = ["Linearisation", "pattern_error"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -27,20 +27,6 @@ Complexes = NDArray[np.complex128]
 # First harmonic of a square wave of height 1: the most a force that saturates at 1 can have.
 SQUARE = 4 / math.pi
 DECADES, RELAXATIONS_A_DECADE = 3, 2
-
-
-@dataclass(frozen=True)
-class Line:
-    """One frequency of a chain's motion, or its constant deflection (omega 0).
-
-    Attributes
-    ----------
-    drive : complex force on the first actuator. phasor : complex128, shape (n,), the known motion.
-    """
-
-    omega: float
-    drive: complex
-    phasor: Complexes
 
 
 @dataclass(frozen=True)
@@ -62,11 +48,11 @@ class Linearisation:
         return np.concatenate([closing, self.point.lam])
 
     @cached_property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[PointTone, ...]:
         """Of its vibration, the first is that at the point's own frequency; one of omega 0 for a deflection."""
         if not self.moving:
-            return (Line(0.0, 0j, self.point.mean.astype(np.complex128)),)
-        return tuple(Line(tone.omega, tone.epsilon, tone.phasor) for tone in self.point.every_tone)
+            return (PointTone(0.0, 0j, self.point.mean.astype(np.complex128)),)
+        return self.point.every_tone
 
     @cached_property
     def moving(self) -> bool:
@@ -83,10 +69,10 @@ class Linearisation:
         """Largest amplitude of each actuator, all lines in step; float64, shape (n,)."""
         return np.asarray(np.sum([np.abs(line.phasor) for line in self.lines], axis=0))
 
-    def electric(self, line: Line) -> Complexes:
+    def electric(self, line: PointTone) -> Complexes:
         """Force through the piezo of each actuator: drive, bias, and what its link brings; complex128, shape (n,)."""
         force = self.lam * (np.roll(line.phasor, 1) - line.phasor)
-        force[0] += line.drive
+        force[0] += line.epsilon
         return force + (self.point.bias if line.omega == 0 else 0.0)
 
     def impedance(self, omega: float, stiffening: Floats | float = 0.0) -> Complexes:
@@ -97,7 +83,7 @@ class Linearisation:
         matrix[np.arange(n), np.arange(n) - 1] -= self.lam
         return matrix
 
-    def moved(self, line: Line, force: Complexes) -> Complexes:
+    def moved(self, line: PointTone, force: Complexes) -> Complexes:
         """How a line changes under further forces of shape (n,) or (n, k), to first order; complex128, same shape."""
         beta, size2 = self.chain.betas, self.size**2
         if not self.moving:
@@ -115,7 +101,7 @@ class Linearisation:
         found = []
         for line in self.lines:
             force = self.point.bias.astype(np.complex128) if line.omega == 0 else np.zeros(self.chain.n, np.complex128)
-            force[0] += line.drive
+            force[0] += line.epsilon
             found.append(np.linalg.solve(self.impedance(line.omega), force) - line.phasor)
         return found
 
@@ -191,7 +177,7 @@ class Linearisation:
             found.append(self.moved(line, row_lam * ((same[0] if same else 0.0) - line.phasor)))
         return found
 
-    def _moved_along(self, row_lam: float, line: Line) -> Floats:
+    def _moved_along(self, row_lam: float, line: PointTone) -> Floats:
         return np.asarray(np.abs(np.linalg.solve(self.impedance(line.omega, row_lam), row_lam * line.phasor)))
 
     def through_amplifier(self, bandwidth: float, slew: float) -> list[Complexes]:
@@ -200,11 +186,11 @@ class Linearisation:
         for line in self.lines:
             factor = (1 / (1 + 1j * line.omega / bandwidth)) / max(1.0, slew)
             force = np.zeros(self.chain.n, np.complex128)
-            force[0] = (factor - 1) * line.drive
+            force[0] = (factor - 1) * line.epsilon
             found.append(self.moved(line, force))
         return found
 
-    def scattered(self, spread: Spread, phased: NDArray[np.bool_]) -> Floats:
+    def scattered(self, spread: RelativeSpread, phased: NDArray[np.bool_]) -> Floats:
         """Standard deviation of each actuator's amplitude, or of its phasor where `phased`; float64, shape (n,)."""
         total, chain = np.zeros(self.chain.n), self.chain
         for line in self.lines:

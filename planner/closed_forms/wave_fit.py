@@ -15,7 +15,7 @@ from chainsim import Chain, Outcome, Response, balance_near, gradient
 
 from ..operating_point import OperatingPoint, setting_of
 
-__all__ = ["Fitted", "Freedom", "Wanted", "fit", "response_to"]
+__all__ = ["FittedPoint", "Freedom", "Wanted", "fit", "response_to"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -90,7 +90,7 @@ class Freedom:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedPoint:
     """An operating point, what is held there, and the worst deviation (infinite where nothing near it is held)."""
 
     point: OperatingPoint
@@ -116,7 +116,7 @@ def response_to(chain: Chain, point: OperatingPoint, guess: Complexes) -> Respon
     return balance_near(chain, setting_of(chain, [point]), guess[None, :], tol=TOL)
 
 
-def fit(chain: Chain, wanted: Wanted, start: OperatingPoint, freedom: Freedom) -> Fitted:
+def fit(chain: Chain, wanted: Wanted, start: OperatingPoint, freedom: Freedom) -> FittedPoint:
     """The settings nearest to the wish that can be walked to from `start`."""
     here = _tried(chain, wanted, _within(start, freedom), wanted.phasor)
     damping = DAMPING
@@ -142,14 +142,14 @@ def fit(chain: Chain, wanted: Wanted, start: OperatingPoint, freedom: Freedom) -
     return here
 
 
-def _tried(chain: Chain, wanted: Wanted, point: OperatingPoint, guess: Complexes) -> Fitted:
+def _tried(chain: Chain, wanted: Wanted, point: OperatingPoint, guess: Complexes) -> FittedPoint:
     response = response_to(chain, point, guess)
     phasor = response.phasor[0]
     known = response.outcome[0] in (Outcome.OK, Outcome.UNSTABLE) and bool(np.isfinite(phasor).all())
-    return Fitted(point, response, wanted.error(phasor) if known else np.inf)
+    return FittedPoint(point, response, wanted.error(phasor) if known else np.inf)
 
 
-def _merit(wanted: Wanted, fitted: Fitted) -> float:
+def _merit(wanted: Wanted, fitted: FittedPoint) -> float:
     return float(np.sum(wanted.residual(fitted.phasor) ** 2)) if np.isfinite(fitted.error) else np.inf
 
 
@@ -168,7 +168,7 @@ def _within(point: OperatingPoint, freedom: Freedom) -> OperatingPoint:
     return point
 
 
-def _jacobian(chain: Chain, wanted: Wanted, here: Fitted, freedom: Freedom) -> Floats:
+def _jacobian(chain: Chain, wanted: Wanted, here: FittedPoint, freedom: Freedom) -> Floats:
     """Derivative of the residual by log drive, phase, links and omega, shape (2 n, P)."""
     if chain.feed_forward:
         slope = gradient(chain, setting_of(chain, [here.point]), here.response)

@@ -15,7 +15,7 @@ from ..margins import converter_error
 from ..operating_point import OperatingPoint
 from ..outlook import FrameSpread, TradePoint
 from ..targets import AmplitudeTarget, ChainTarget
-from .batch_march import Parts, march
+from .batch_march import BatchParts, march
 from .spread import (
     THRESHOLD,
     TOLERANCE,
@@ -58,7 +58,7 @@ def expected_of(device: Device, amplitude: Floats, epsilon: Floats, lam: Floats,
     return float(np.mean([_report(wish, parts, drive, links, omega).expected for wish, drive, links in held]))
 
 
-def _report(wish: Wish, parts: Parts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
+def _report(wish: Wish, parts: BatchParts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
     """Settings of one chain under drawn parts."""
     force = np.zeros((len(lam) + 1, 1, 1), dtype=np.complex128)
     force[0] = epsilon
@@ -233,9 +233,9 @@ class Expectation:
         return tuple(points)
 
 
-def _toned(device: Device, state: OperatingPoint, parts: Parts) -> _Drawn:
+def _toned(device: Device, state: OperatingPoint, parts: BatchParts) -> _Drawn:
     """One chain of several tones, each of which is to make its part of the amplitude."""
-    flat = Parts(*(getattr(parts, field.name)[:, 0] for field in fields(Parts)))
+    flat = BatchParts(*(getattr(parts, field.name)[:, 0] for field in fields(BatchParts)))
     motion = march_tones(state, flat)
     levels = np.abs(motion.phasor[motion.wanted]) / device.full_scale
     target = state.target[:, None]

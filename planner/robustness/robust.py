@@ -12,8 +12,8 @@ from chainsim import Device
 from ..closed_forms.links import drive_for, links_for
 from ..errors import PlanError
 from ..operating_point import OperatingPoint
-from .robust_search import Search, TradeRow, Trial
-from .spread import Spread
+from .robust_search import RobustSearch, TradeRow, Trial
+from .spread import RelativeSpread
 
 __all__ = [
     "Accuracy",
@@ -82,7 +82,7 @@ class Accuracy:
     """
 
     factor: float
-    spread: Spread
+    spread: RelativeSpread
     row: TradeRow
 
 
@@ -101,7 +101,7 @@ def robust_plan(device: Device, trial: Trial, nominal: OperatingPoint, *, well_s
     RobustError
         When `nominal` itself is beyond what the device can hold.
     """
-    search = Search(device, trial, trial.spread)
+    search = RobustSearch(device, trial, trial.spread)
     given = search.row(nominal)
     if not search.fits(nominal) or given.well > well_share:
         raise RobustError(
@@ -154,6 +154,6 @@ def accuracy_needed(device: Device, trial: Trial, nominal: OperatingPoint, *, sh
 
 def _best(device: Device, trial: Trial, factor: float, nominal: OperatingPoint) -> TradeRow:
     """Of `nominal` and the setting with the least expected error near it, the one with the greater yield."""
-    search = Search(device, trial, trial.spread.scaled(factor))
+    search = RobustSearch(device, trial, trial.spread.scaled(factor))
     rows = [search.row(nominal), search.row(search.least(nominal, free_omega=False))]
     return max(rows, key=lambda row: row.report.yield_)

@@ -12,7 +12,7 @@ from chainsim import Device, Outcome, solve
 from ..closed_forms.links import drive_for, links_for
 from ..margins import WELL_SHARE
 from ..operating_point import OperatingPoint, setting_of
-from .robust_search import Search, TradeRow, Trial
+from .robust_search import RobustSearch, TradeRow, Trial
 from .spread import THRESHOLD, TOLERANCE, Wish, known_spread
 
 __all__ = ["aim_for"]
@@ -44,7 +44,7 @@ def aim_for(device: Device, target: Floats, omega: float, chains: int) -> Floats
     chain, wanted = device.chain, target * device.full_scale
     wish = Wish(target[None].astype(np.complex128), device.full_scale)
     trial = Trial(chain, wish, known_spread(device), TOLERANCE, THRESHOLD, JUDGED, SEED)
-    search = Search(device, trial, trial.spread, min(chains, MOST_COPIES))
+    search = RobustSearch(device, trial, trial.spread, min(chains, MOST_COPIES))
     nominal = OperatingPoint(float(drive_for(chain, wanted[:1], omega)[0]), links_for(chain, wanted, omega), omega)
     if not search.fits(nominal):
         return target
@@ -61,7 +61,7 @@ def _safe(row: TradeRow) -> bool:
     return row.well <= WELL_SHARE and row.volts <= 1
 
 
-def _settable(search: Search, point: OperatingPoint) -> OperatingPoint:
+def _settable(search: RobustSearch, point: OperatingPoint) -> OperatingPoint:
     """With the nearest links that can be set."""
     coupling, gain = search.device.coupling, search.gain
     steps = np.rint((point.lam / gain - coupling.lam.min) / coupling.lam_step)

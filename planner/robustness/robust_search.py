@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from chainsim import Chain, Device
 
 from ..operating_point import OperatingPoint
-from .batch_march import Motion, Parts, march
-from .spread import Draws, Spread, SpreadError, SpreadReport, Wish, draw, judge
+from .batch_march import BatchMotion, BatchParts, march
+from .spread import Draws, RelativeSpread, SpreadError, SpreadReport, Wish, draw, judge
 
-__all__ = ["Search", "TradeRow", "Trial"]
+__all__ = ["RobustSearch", "TradeRow", "Trial"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -45,7 +45,7 @@ class Trial:
 
     chain: Chain
     wish: Wish
-    spread: Spread
+    spread: RelativeSpread
     tolerance: float
     threshold: float
     count: int
@@ -81,13 +81,13 @@ class TradeRow:
         }  # fmt: skip
 
 
-class Search:
+class RobustSearch:
     """Settings of one chain, judged and improved under one spread.
 
     `copies` : how many chains such as this one stand side by side; it is the error of the worst that counts.
     """
 
-    def __init__(self, device: Device, trial: Trial, spread: Spread, copies: int = 1) -> None:
+    def __init__(self, device: Device, trial: Trial, spread: RelativeSpread, copies: int = 1) -> None:
         self.device, self.trial, self.copies, chain = device, trial, copies, trial.chain
         if not chain.feed_forward:
             raise SpreadError(f"robust: settings are searched for in open chains, got {chain.closure}")
@@ -96,7 +96,7 @@ class Search:
         self.fitted = both.parts(chain, spread)
         # Another stream of the same seed: what is fitted is not judged by the draws it was fitted to.
         self.judged = draw(chain.n, count=trial.count, seed=trial.seed + 1).parts(chain, spread)
-        self.exact = draw(chain.n, count=1, seed=trial.seed).parts(chain, Spread())
+        self.exact = draw(chain.n, count=1, seed=trial.seed).parts(chain, RelativeSpread())
         self.tied = device.coupling.scope in {"fixed", "device", "chain"}
         one = device.rows * device.chains_per_row == 1
         # What each link makes of the lam it is set to; settings here are what links make.
@@ -124,7 +124,7 @@ class Search:
             ),
         )
 
-    def _motion(self, parts: Parts, point: OperatingPoint) -> Motion:
+    def _motion(self, parts: BatchParts, point: OperatingPoint) -> BatchMotion:
         n = self.trial.chain.n
         force = np.zeros((n, 1, 1), dtype=np.complex128)
         force[0] = abs(point.epsilon)
@@ -201,7 +201,7 @@ class Search:
         shares = self._shares(size)
         return float(shares @ size), at_worst.reshape(len(at_worst), -1) @ shares
 
-    def _judged(self, parts: Parts, x: Floats, like: OperatingPoint) -> tuple[Floats, Floats]:
+    def _judged(self, parts: BatchParts, x: Floats, like: OperatingPoint) -> tuple[Floats, Floats]:
         """Deviations, shape (n, 1, draws), and their derivatives by `x`, shape (n, D, 1, draws)."""
         point = self._point(x, like)
         motion = self._motion(parts, point)
@@ -211,7 +211,7 @@ class Search:
         return self.trial.wish.deviation(motion.phasor), slopes
 
 
-def _own(phasor: Complexes, parts: Parts, point: OperatingPoint) -> Complexes:
+def _own(phasor: Complexes, parts: BatchParts, point: OperatingPoint) -> Complexes:
     """Derivative of each oscillator's balance by log epsilon, every log lam, and omega, at fixed phasors."""
     n = len(phasor)
     own = np.zeros((n, n + 1, *phasor.shape[1:]), dtype=np.complex128)

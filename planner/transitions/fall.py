@@ -21,8 +21,8 @@ from ..plan import Ramp
 from .check import Orbit, Way, travel
 from .limits import WayLimits, checked
 from .rise import orbit_of, ramp_of
-from .search import MET, MOST_PERIODS, STANDS, Search
-from .slow_flow import Course, follow_course
+from .search import MET, MOST_PERIODS, STANDS, RampSearch
+from .slow_flow import DriveCourse, follow_course
 from .steering import Steering, rest
 
 __all__ = ["find_fall"]
@@ -68,14 +68,16 @@ def _stopped(
     """The shortest way found whose end is stopped by the drive."""
     held = replace(held, phasor=orbit.harmonics[0])
     calm = CALM * float(np.abs(held.phasor).max())
-    found: list[tuple[Search, Steering, Floats]] = []
+    found: list[tuple[RampSearch, Steering, Floats]] = []
     longest = MOST_PERIODS * 2 * math.pi / omega
     spent, waits = 0, [min(efolds * 2 / max(chain.delta, 1e-9), longest) for efolds in WAITS]
     while waits:
         wait = waits.pop(0)
         ahead = _let_go(held, omega, limits, wait)
         start = replace(rest(ahead.lam[-1], omega), phasor=_left(chain, held, omega, ahead))
-        search = Search(chain, start, rest(ahead.lam[-1], omega), omega, limits, tau_per_s, budget, orbit, ahead, spent)
+        search = RampSearch(
+            chain, start, rest(ahead.lam[-1], omega), omega, limits, tau_per_s, budget, orbit, ahead, spent
+        )
         task = search.task(STOP * search.first_length)
         task = search.task(max(task.duration, INTERVAL * task.intervals / omega))
         unknowns = _after(search, task, found)
@@ -90,7 +92,7 @@ def _stopped(
     return None
 
 
-def _after(search: Search, task: Steering, found: list[tuple[Search, Steering, Floats]]) -> Floats | None:
+def _after(search: RampSearch, task: Steering, found: list[tuple[RampSearch, Steering, Floats]]) -> Floats | None:
     """The stop after less waiting from that after more: as much stronger and turned as what is to be stopped."""
     if not found:
         return search.from_nothing(task)
@@ -131,7 +133,7 @@ def _left(chain: Chain, held: OperatingPoint, omega: float, way: Way) -> Complex
     epsilon, epsilon_slope = way.drive(tau)
     lam = np.pad(way.links(tau), ((0, 0), (1, 0)))
     slope = np.gradient(lam, tau, axis=0)
-    course = Course(epsilon[:, None], epsilon_slope[:, None], lam, slope, np.zeros_like(lam))
+    course = DriveCourse(epsilon[:, None], epsilon_slope[:, None], lam, slope, np.zeros_like(lam))
     return np.asarray(follow_course(chain, omega, duration, course, held.phasor, 1.0)[-1, :, 0])
 
 

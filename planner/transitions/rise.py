@@ -19,7 +19,7 @@ from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way
 from .limits import WayLimits, checked
-from .search import ARRIVES, Search
+from .search import ARRIVES, RampSearch
 from .steering import rest
 
 __all__ = ["find_way", "orbit_of", "ramp_of"]
@@ -60,7 +60,7 @@ def find_way(
     if orbit is not None and not lacking:
         held = replace(held, phasor=orbit.harmonics[0])
         lacking = limits.unfit(held.lam)
-    search = Search(chain, rest(held.lam, omega), held, omega, limits, tau_per_s, budget)
+    search = RampSearch(chain, rest(held.lam, omega), held, omega, limits, tau_per_s, budget)
     if not lacking:
         found = search.shorter_and_shorter()
         longer = search.longer_and_longer(found[0][0]) if found else ()

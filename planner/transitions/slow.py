@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..drive import felt, play, smooth_step
-from ..operating_point import OperatingPoint, Tone
+from ..operating_point import OperatingPoint, PointTone
 from ..plan import Ramp, ToneRamp
 
 __all__ = ["Watched", "periods_in", "settled", "slow_fall", "slow_rise", "watched"]
@@ -59,7 +59,7 @@ def _rise_ramp(device: Device, point: OperatingPoint, rise: float, end: float, l
     return Ramp(tau / device.tau_per_s, first.epsilon, first.epsilon_slope, lacking=lacking, tones=tuple(others))
 
 
-def _tone_ramp(tone: Tone, size: Floats, slope: Floats) -> ToneRamp:
+def _tone_ramp(tone: PointTone, size: Floats, slope: Floats) -> ToneRamp:
     return ToneRamp(tone.omega, np.asarray(tone.epsilon * size), np.asarray(tone.epsilon * slope))
 
 

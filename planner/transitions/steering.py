@@ -17,7 +17,7 @@ from chainsim import Chain
 
 from ..drive import smooth_step
 from ..operating_point import OperatingPoint
-from .slow_flow import Course, follow_course
+from .slow_flow import DriveCourse, follow_course
 
 __all__ = ["LinkCourse", "Steering", "rest"]
 
@@ -142,7 +142,7 @@ class Steering:
         x = np.linspace(0.0, 1.0, 2 * self.steps + 1)
         epsilon, epsilon_slope = self.drive(x, unknowns)
         lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.start, self.held))
-        course = Course(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
+        course = DriveCourse(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
         with np.errstate(all="ignore"):
             return follow_course(self.chain, self.omega, self.duration, course, self.start.phasor, softness)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chainsim import Device
 
 from ..drive import smooth_step
-from ..operating_point import OperatingPoint, Tone
+from ..operating_point import OperatingPoint, PointTone
 from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
 from .hermite import broken_line
@@ -84,7 +84,7 @@ def _steered(device: Device, point: OperatingPoint, limits: WayLimits) -> Ramp |
     return Ramp(t_s, first.epsilon, first.epsilon_slope, lam_t_s=lam_t_s, lam=lam, tones=tuple(others))
 
 
-def _task(device: Device, point: OperatingPoint, tone: Tone, other: Tone, limits: WayLimits) -> _OneOfTwo:
+def _task(device: Device, point: OperatingPoint, tone: PointTone, other: PointTone, limits: WayLimits) -> _OneOfTwo:
     top = max(min(limits.lam_max, STRONG), float(point.lam.max()))
     duration = STAGE_TIMES * (device.chain_length + 1) * 2 * tone.omega / max(top, device.delta)
     end = OperatingPoint(tone.epsilon, point.lam, tone.omega, tone.phasor)

@@ -12,7 +12,7 @@ from ..operating_point import OperatingPoint
 from ..plan import Ramp, ToneRamp
 from ..transitions import jets
 from ..transitions.joining import as_tone
-from .walking import Walking
+from .walking import Walks
 
 __all__ = ["SingleWalk"]
 
@@ -20,7 +20,7 @@ __all__ = ["SingleWalk"]
 PERIODS, SMOOTHNESS, NODES = 40, 5, 161
 
 
-class SingleWalk(Walking):
+class SingleWalk(Walks):
     """Two tones of an actuator that is alone, each in closed form, and so are the ways."""
 
     def enter(self, point: OperatingPoint, moves: bool) -> Ramp:

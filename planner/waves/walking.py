@@ -14,14 +14,14 @@ from chainsim import Device, Outcome
 from ..closed_forms.links import detuning_gain
 from ..family import RisingFamily
 from ..margins import lacking_of, slew_of
-from ..operating_point import Margins, OperatingPoint, Tone
+from ..operating_point import Margins, OperatingPoint, PointTone
 from ..plan import Ramp
 from ..targets import ChainTarget, WalkingTarget
 from ..transitions.slow import slow_fall
 from ..transitions.waves import enter_tones
-from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
+from .two_tones import MAIN, ORDERS, TwoToneWave, apart, two_tones
 
-__all__ = ["TONES_GOOD", "Walking", "walking_rate_hz", "walking_state"]
+__all__ = ["TONES_GOOD", "Walks", "walking_rate_hz", "walking_state"]
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
 NARROWEST = 1.01
 
 
-class Walking(RisingFamily):
+class Walks(RisingFamily):
     """Two tones under one lam."""
 
     def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
@@ -74,7 +74,7 @@ def walking_rate_hz(device: Device, state: OperatingPoint) -> float:
     return (other.omega - state.omega) * device.f0_hz
 
 
-def _found(device: Device, level: float, target: WalkingTarget) -> TwoTones | None:
+def _found(device: Device, level: float, target: WalkingTarget) -> TwoToneWave | None:
     """Two tones under a lam that can be set."""
     chain, coupling = device.chain, device.coupling
     amplitude = level * device.full_scale / 2
@@ -115,7 +115,7 @@ def _fitted(device: Device, amplitude: float, width: float, spacing: float) -> f
     return width
 
 
-def _lower(device: Device, level: float, target: WalkingTarget) -> tuple[float, TwoTones | None]:
+def _lower(device: Device, level: float, target: WalkingTarget) -> tuple[float, TwoToneWave | None]:
     good, bad, kept = 0.0, 1.0, None
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
@@ -127,7 +127,7 @@ def _lower(device: Device, level: float, target: WalkingTarget) -> tuple[float, 
     return good, kept
 
 
-def _lacking(device: Device, target: WalkingTarget, found: TwoTones, share: float) -> str:
+def _lacking(device: Device, target: WalkingTarget, found: TwoToneWave, share: float) -> str:
     if share < 1.0:
         part = f"{100 * share:.0f} % of this amplitude"
         return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta)"
@@ -143,13 +143,13 @@ def _lacking(device: Device, target: WalkingTarget, found: TwoTones, share: floa
     return ""
 
 
-def _state(device: Device, target: WalkingTarget, found: TwoTones) -> OperatingPoint:
+def _state(device: Device, target: WalkingTarget, found: TwoToneWave) -> OperatingPoint:
     n = device.chain_length
     lags = np.outer(found.lag, target.place + np.arange(n))
     phasors = found.phasor[:, None] * np.exp(-1j * lags)
     drives = found.epsilon * np.exp(-1j * found.lag * target.place)
     tones = [
-        Tone(float(omega), complex(drive), phasor, side)
+        PointTone(float(omega), complex(drive), phasor, side)
         for omega, drive, phasor, side in zip(found.omega, drives, phasors, SIDE, strict=True)
     ]
     first, *others = sorted(tones, key=lambda tone: tone.side)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.nearest import nearest_geometric
-from ..closed_forms.wave_fit import Fitted, Freedom, Wanted, fit
+from ..closed_forms.wave_fit import FittedPoint, Freedom, Wanted, fit
 from ..operating_point import OperatingPoint
 from ..targets import WaveTarget
 from .search import search
@@ -87,18 +87,18 @@ class WaveFit:
         phasor = share * self.target.levels * self.device.full_scale * np.exp(1j * np.nan_to_num(self.target.phases))
         return Wanted(phasor, self.phased, self.target.weights)
 
-    def stands(self, found: Fitted) -> bool:
+    def stands(self, found: FittedPoint) -> bool:
         """Whether settings hold what they are meant for, and it is stable."""
         return found.outcome is Outcome.OK and found.error <= GOOD * self.scale
 
-    def best(self, share: float) -> Fitted:
+    def best(self, share: float) -> FittedPoint:
         """The nearest found for `share` of the target."""
         wanted, freedom, chain = self.wanted(share), self.freedom, self.device.chain
         guesses = self._guesses(wanted)
         if self.backwards or self.jagged:
             still = replace(freedom, lam=0, omega=False)
             return self._least([fit(chain, guess.wanted, guess.point, still) for guess in guesses], wanted)
-        tries: list[Fitted] = []
+        tries: list[FittedPoint] = []
         for guess in guesses:
             tries.append(self._rounded(fit(chain, guess.wanted, guess.point, freedom), guess.wanted, freedom))
             if self.stands(self._least(tries, wanted)):
@@ -111,7 +111,7 @@ class WaveFit:
             found = self._least([found, *self._link_by_link(found, wanted)], wanted)
         return found
 
-    def lower(self) -> tuple[float, Fitted] | None:
+    def lower(self) -> tuple[float, FittedPoint] | None:
         """The largest share of the target found to stand, and its settings; None where none does."""
         good, bad, kept = 0.0, 1.0, None
         for _ in range(HALVINGS):
@@ -123,12 +123,12 @@ class WaveFit:
                 bad = middle
         return None if kept is None else (good, kept)
 
-    def _least(self, found: list[Fitted], wanted: Wanted) -> Fitted:
+    def _least(self, found: list[FittedPoint], wanted: Wanted) -> FittedPoint:
         """The first that stands, else that with the least error."""
         real = [replace(one, error=wanted.error(one.phasor)) if np.isfinite(one.error) else one for one in found]
         return next((one for one in real if self.stands(one)), min(real, key=lambda one: one.error))
 
-    def _link_by_link(self, found: Fitted, wanted: Wanted) -> list[Fitted]:
+    def _link_by_link(self, found: FittedPoint, wanted: Wanted) -> list[FittedPoint]:
         """Every link for itself: from what was found for them all, and from a search."""
         each, chain = replace(self.freedom, lam=self.device.chain_length - 1), self.device.chain
         # Behind the last actuator that is to move, nothing is passed on.
@@ -140,7 +140,7 @@ class WaveFit:
             tries += [fit(chain, wanted, start, each) for start in search(chain, wanted, each)]
         return [self._rounded(one, wanted, each) for one in tries]
 
-    def _rounded(self, found: Fitted, wanted: Wanted, freedom: Freedom) -> Fitted:
+    def _rounded(self, found: FittedPoint, wanted: Wanted, freedom: Freedom) -> FittedPoint:
         """With every lam one that can be set, drive and frequency refitted."""
         coupling = self.device.coupling
         if not coupling.lam_step or not freedom.lam or not np.isfinite(found.error):

@@ -12,7 +12,7 @@ from chainsim import Closure, Device, Outcome
 
 from ..closed_forms.links import detuning_gain
 from ..closed_forms.nearest import nearest_geometric
-from ..closed_forms.wave_fit import Fitted
+from ..closed_forms.wave_fit import FittedPoint
 from ..family import RisingFamily
 from ..margins import converter_error, lacking_of, slew_of, well_of
 from ..operating_point import Margins, OperatingPoint
@@ -86,7 +86,7 @@ class _Told:
     """What was found for `share` of a target, to be told."""
 
     task: WaveFit
-    found: Fitted
+    found: FittedPoint
     share: float
 
     def state(self) -> OperatingPoint:
