@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         accuracy_needed,
         robust_plan,
     )
-    from .robustness.spread import RelativeSpread, SpreadError, SpreadReport, Wish, spread_of, wish_of
+    from .robustness.spread import FrameTarget, RelativeSpread, SpreadError, SpreadReport, frame_target, spread_of
     from .surroundings import HigherMode, Surroundings, assumed
     from .waves.walking import walking_rate_hz
 
@@ -42,6 +42,7 @@ __all__ = [
     "FirstOrderHold",
     "FramePlan",
     "FrameSpread",
+    "FrameTarget",
     "HigherMode",
     "Margins",
     "OperatingPoint",
@@ -73,12 +74,12 @@ __all__ = [
     "TradeoffError",
     "TradeoffRow",
     "Trial",
-    "Wish",
     "accuracy_needed",
     "assumed",
     "climb",
     "curve",
     "fit_chain",
+    "frame_target",
     "front_of",
     "links_at",
     "pareto_of",
@@ -91,7 +92,6 @@ __all__ = [
     "tones_of",
     "trade_off",
     "walking_rate_hz",
-    "wish_of",
 ]
 
 _LATE = {
@@ -130,12 +130,12 @@ _LATE = {
     "SweepError": "identification.calibration",
     "TradeRow": "robustness.robust",
     "Trial": "robustness.robust",
-    "Wish": "robustness.spread",
+    "FrameTarget": "robustness.spread",
     "accuracy_needed": "robustness.robust",
     "fit_chain": "identification.calibration",
     "robust_plan": "robustness.robust",
     "spread_of": "robustness.spread",
-    "wish_of": "robustness.spread",
+    "frame_target": "robustness.spread",
 }
 
 

@@ -24,7 +24,16 @@ from planner.robustness import expected as expected_module
 from planner.robustness.expected import WANTED, Expectation
 from planner.robustness.robust_aim import aim_for
 from planner.robustness.robust_search import RobustSearch, Trial
-from planner.robustness.spread import THRESHOLD, TOLERANCE, RelativeSpread, Wish, drawn_in, judge, motion_of, wish_of
+from planner.robustness.spread import (
+    THRESHOLD,
+    TOLERANCE,
+    FrameTarget,
+    RelativeSpread,
+    drawn_in,
+    frame_target,
+    judge,
+    motion_of,
+)
 from planner.targets import WalkingTarget
 from planner.waves.walking import walking_state
 
@@ -89,7 +98,7 @@ def test_a_frame_is_as_good_as_its_rows_drawn_together() -> None:
     held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
     there = [replace(state, target=one.levels) for one, state in zip(held, frame.states, strict=True)]
     motion = motion_of(there, drawn_in(device, RelativeSpread(f0=0.01), range(6), count=1000, seed=0))
-    report = judge(wish_of(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
+    report = judge(frame_target(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
     assert of(frame).expected == pytest.approx(report.expected, rel=1e-6)
     assert of(frame).yield_ == pytest.approx(report.yield_, abs=2e-3)
 
@@ -164,7 +173,9 @@ def settings(device: Device, amplitude: Floats, omega: float) -> OperatingPoint:
 
 def test_the_worst_of_several_copies_is_what_it_says() -> None:
     device = spread(LINKED).alone(0)
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0)
+    trial = Trial(
+        device.chain, FrameTarget(PROFILE[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0
+    )
     errors = np.random.default_rng(0).exponential(size=500)
     assert RobustSearch(device, trial, trial.spread).worst_of(errors) == pytest.approx(errors.mean())
     drawn = np.random.default_rng(1).choice(errors, (200_000, 4)).max(axis=1)
@@ -177,7 +188,13 @@ def test_an_aim_is_never_worse_than_the_wish_on_fresh_draws(seed: int) -> None:
     target = np.random.default_rng(seed).choice([0.1, 1.0], 6)
     aim = aim_for(device, target, omega, 1)
     trial = Trial(
-        device.chain, Wish(target[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 2000, 99 + seed
+        device.chain,
+        FrameTarget(target[None] + 0j, 0.05),
+        RelativeSpread(f0=0.01),
+        TOLERANCE,
+        THRESHOLD,
+        2000,
+        99 + seed,
     )
     search = RobustSearch(device, trial, trial.spread)
     wished, aimed = (search.row(settings(device, one * 0.05, omega)).report.expected for one in (target, aim))

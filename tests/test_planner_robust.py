@@ -15,14 +15,14 @@ from planner.closed_forms.links import drive_for, links_for
 from planner.operating_point import OperatingPoint
 from planner.robustness.robust import RobustError, RobustPlan, Trial, accuracy_needed, robust_plan
 from planner.robustness.robust_search import RobustSearch
-from planner.robustness.spread import RelativeSpread, Wish, draw, spread_of
+from planner.robustness.spread import FrameTarget, RelativeSpread, draw, spread_of
 
 Floats = NDArray[np.float64]
 
 DEVICE = load_device("linked-6x6")
 CHAIN = DEVICE.chain
 PROFILE = np.array([1, 1, 0.1, 0.1, 1, 1])
-WISH = Wish(PROFILE[None] + 0j, DEVICE.full_scale)
+WISH = FrameTarget(PROFILE[None] + 0j, DEVICE.full_scale)
 TRIAL = Trial(CHAIN, WISH, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=1000, seed=0)
 WELL = 0.8
 
@@ -99,7 +99,7 @@ def test_fewer_volts_leave_less_robustness() -> None:
 
 @pytest.mark.parametrize("phase_matters", [False, True])
 def test_the_gradient_is_a_finite_difference(phase_matters: bool) -> None:
-    wish = Wish(PROFILE[None] * np.exp(1j * np.arange(6)), DEVICE.full_scale, phase_matters)
+    wish = FrameTarget(PROFILE[None] * np.exp(1j * np.arange(6)), DEVICE.full_scale, phase_matters)
     search = RobustSearch(DEVICE, replace(TRIAL, wish=wish), RelativeSpread(f0=0.01, delta=0.1, beta=0.1, lam=0.05))
     held = closed_form(1.2)
     x, h = np.array([*np.log([held.epsilon, *held.lam]), held.omega]), 1e-7
@@ -166,7 +166,7 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
         omega2 = 1 + 0.75 * device.beta * a**2 + lam * (1 - math.cos(lag))
     epsilon = a * math.hypot(1 - omega2 + 0.75 * device.beta * a**2, device.delta * math.sqrt(omega2))
     nominal = OperatingPoint(epsilon, np.full(5, lam), math.sqrt(omega2))
-    wish = Wish(np.exp(-1j * lag * np.arange(6))[None], a, phase_matters=True)
+    wish = FrameTarget(np.exp(-1j * lag * np.arange(6))[None], a, phase_matters=True)
     trial = Trial(device.chain, wish, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=400, seed=0)
     plan = robust_plan(device, trial, nominal, well_share=WELL)
     assert plan.nominal.nominal_error < 1e-9
@@ -180,7 +180,9 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
 
 def test_no_accuracy_helps_a_setting_that_cannot_make_the_pattern() -> None:
     device = load_device("paper-6x6")
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.02), RelativeSpread(f0=0.01), 0.05, 0.5, count=50, seed=0)
+    trial = Trial(
+        device.chain, FrameTarget(PROFILE[None] + 0j, 0.02), RelativeSpread(f0=0.01), 0.05, 0.5, count=50, seed=0
+    )
     found = accuracy_needed(device, trial, OperatingPoint(1e-4, np.full(5, 6e-3), 1.0), share=0.9)
     assert found.factor == 0.0
     assert found.row.report.yield_ < 0.9

@@ -19,7 +19,7 @@ from planner.errors import PlanError
 from planner.operating_point import OperatingPoint, PointTone
 from planner.robustness.batch_march import BatchParts, march
 from planner.robustness.ring_march import march_ring
-from planner.robustness.spread import RelativeSpread, SpreadError, Wish, draw, judge, motion_of, spread_of
+from planner.robustness.spread import FrameTarget, RelativeSpread, SpreadError, draw, judge, motion_of, spread_of
 from planner.robustness.tone_march import march_tones
 from planner.waves.two_tones import MAIN, two_tones
 
@@ -132,7 +132,7 @@ def test_quantiles_of_one_linear_actuator_are_those_of_the_normal_distribution()
     # Above resonance the amplitude falls as the natural frequency falls, so the draws that are made are an interval.
     chain, omega, sigma, epsilon = Chain(1, 5e-3, 0.0), 1.2, 0.01, 0.1
     nominal = epsilon / abs(1 - omega**2 + 1j * chain.delta * omega)
-    wish = Wish(np.array([[1.0 + 0j]]), nominal)
+    wish = FrameTarget(np.array([[1.0 + 0j]]), nominal)
     parts = draw(1, count=200_000, seed=0).parts(chain, RelativeSpread(f0=sigma))
     report = judge(
         wish, march(parts, np.full((1, 1, 1), epsilon + 0j), np.zeros((1, 1, 1)), omega), tolerance=0.05, threshold=0.5
@@ -204,7 +204,7 @@ def test_a_common_phase_changes_no_error(turn: float, phase_matters: bool) -> No
     rng = np.random.default_rng(1)
     wanted = np.exp(1j * rng.uniform(0, 6, (2, 6))) * rng.uniform(0.1, 1, (2, 6))
     phasor = wanted.T[:, :, None] * rng.normal(1, 0.1, (6, 2, 5)) * 0.05
-    wish = Wish(wanted, 0.05, phase_matters=phase_matters)
+    wish = FrameTarget(wanted, 0.05, phase_matters=phase_matters)
     np.testing.assert_allclose(
         np.abs(wish.deviation(phasor)), np.abs(wish.deviation(phasor * np.exp(1j * turn))), atol=1e-12
     )
@@ -214,12 +214,12 @@ def test_a_frame_shares_its_phase_over_chains_of_one_group() -> None:
     wanted = np.exp(1j * np.array([[0.0, 0.3], [1.0, 1.3]]))
     off = np.array([1.0, np.exp(0.2j)])[None, :, None]
     phasor = wanted.T[:, :, None] * off
-    together = Wish(wanted, 1.0, phase_matters=True).deviation(phasor)
+    together = FrameTarget(wanted, 1.0, phase_matters=True).deviation(phasor)
     # One turn by 0.1 radians leaves each chain 0.1 radians off.
     np.testing.assert_allclose(together, 2 * np.sin(0.05), rtol=1e-12)
-    apart = Wish(wanted, 1.0, phase_matters=True, group=np.array([0, 1])).deviation(phasor)
+    apart = FrameTarget(wanted, 1.0, phase_matters=True, group=np.array([0, 1])).deviation(phasor)
     assert np.abs(apart).max() < 1e-12
-    some = Wish(wanted, 1.0, phase_matters=np.array([[True, True], [False, False]])).deviation(phasor)
+    some = FrameTarget(wanted, 1.0, phase_matters=np.array([[True, True], [False, False]])).deviation(phasor)
     assert np.abs(some).max() < 1e-12
 
 
@@ -239,9 +239,9 @@ def test_planned_phases_and_tones_are_known() -> None:
 def test_phase_matters_only_when_it_does_and_weights_forgive() -> None:
     wanted = np.ones((1, 3), dtype=np.complex128)
     phasor = np.array([1.0, 1j, -1.0]).reshape(3, 1, 1)
-    assert np.abs(Wish(wanted, 1.0).deviation(phasor)).max() == 0
-    assert np.abs(Wish(wanted, 1.0, phase_matters=True).deviation(phasor)).max() > 1
-    wish = Wish(wanted, 1.0, weight=np.array([[1.0, 0.0, 1.0]]))
+    assert np.abs(FrameTarget(wanted, 1.0).deviation(phasor)).max() == 0
+    assert np.abs(FrameTarget(wanted, 1.0, phase_matters=True).deviation(phasor)).max() > 1
+    wish = FrameTarget(wanted, 1.0, weight=np.array([[1.0, 0.0, 1.0]]))
     off = wish.deviation(np.array([1.0, 5.0, 1.0]).reshape(3, 1, 1) + 0j)
     assert np.abs(off).max() == 0
 
@@ -254,7 +254,7 @@ def test_slopes_are_finite_differences(phase_matters: bool | NDArray[np.bool_], 
     def noise(*shape: int) -> Complexes:
         return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
 
-    wish = Wish(noise(2, 6), 0.5, phase_matters=phase_matters, weight=rng.uniform(0, 1, (2, 6)), group=group)
+    wish = FrameTarget(noise(2, 6), 0.5, phase_matters=phase_matters, weight=rng.uniform(0, 1, (2, 6)), group=group)
     phasor, change, h = noise(6, 2, 4), noise(6, 3, 2, 4), 1e-6
     slopes = wish.slope(phasor, change)
     for d in range(3):
@@ -267,7 +267,7 @@ def test_an_actuator_beyond_its_hilltop_is_not_made() -> None:
     parts = draw(1, count=1, seed=0).parts(chain, RelativeSpread())
     motion = march(parts, np.full((1, 1, 1), 2.0 + 0j), np.zeros((1, 1, 1)), 1.05)
     assert motion.escaped.all()
-    report = judge(Wish(np.ones((1, 1)) + 0j, abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5)
+    report = judge(FrameTarget(np.ones((1, 1)) + 0j, abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5)
     assert report.error.max() < 1e-12
     assert report.yield_ == 0.0
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setting, Span, load_device, solve
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
 from planner import OperatingPoint
-from planner.closed_forms.wave_fit import Freedom, Wanted, fit, response_to
+from planner.closed_forms.wave_fit import Freedom, MotionTarget, fit, response_to
 from planner.margins import converter_error
 from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
@@ -74,7 +74,7 @@ def test_refinement_finds_settings_that_were_hidden() -> None:
     target = response_to(CHAIN, hidden, shape).phasor[0]
     start = wave_for(CHAIN, amplitude=0.045, lag=math.radians(95))
     found = fit(
-        CHAIN, Wanted(target, np.ones(6, dtype=np.bool_), np.ones(6)),
+        CHAIN, MotionTarget(target, np.ones(6, dtype=np.bool_), np.ones(6)),
         start, Freedom(1, 0.0, 0.05, 0.9, 1.1),
     )  # fmt: skip
     assert found.error < 1e-8

@@ -15,7 +15,7 @@ from chainsim import Chain, Outcome, Response, balance_near, gradient
 
 from ..operating_point import OperatingPoint, setting_of
 
-__all__ = ["FittedPoint", "Freedom", "Wanted", "fit", "response_to"]
+__all__ = ["FittedPoint", "Freedom", "MotionTarget", "fit", "response_to"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -34,7 +34,7 @@ DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MotionTarget:
     """A motion that is wished for.
 
     Attributes
@@ -116,7 +116,7 @@ def response_to(chain: Chain, point: OperatingPoint, guess: Complexes) -> Respon
     return balance_near(chain, setting_of(chain, [point]), guess[None, :], tol=TOL)
 
 
-def fit(chain: Chain, wanted: Wanted, start: OperatingPoint, freedom: Freedom) -> FittedPoint:
+def fit(chain: Chain, wanted: MotionTarget, start: OperatingPoint, freedom: Freedom) -> FittedPoint:
     """The settings nearest to the wish that can be walked to from `start`."""
     here = _tried(chain, wanted, _within(start, freedom), wanted.phasor)
     damping = DAMPING
@@ -142,14 +142,14 @@ def fit(chain: Chain, wanted: Wanted, start: OperatingPoint, freedom: Freedom) -
     return here
 
 
-def _tried(chain: Chain, wanted: Wanted, point: OperatingPoint, guess: Complexes) -> FittedPoint:
+def _tried(chain: Chain, wanted: MotionTarget, point: OperatingPoint, guess: Complexes) -> FittedPoint:
     response = response_to(chain, point, guess)
     phasor = response.phasor[0]
     known = response.outcome[0] in (Outcome.OK, Outcome.UNSTABLE) and bool(np.isfinite(phasor).all())
     return FittedPoint(point, response, wanted.error(phasor) if known else np.inf)
 
 
-def _merit(wanted: Wanted, fitted: FittedPoint) -> float:
+def _merit(wanted: MotionTarget, fitted: FittedPoint) -> float:
     return float(np.sum(wanted.residual(fitted.phasor) ** 2)) if np.isfinite(fitted.error) else np.inf
 
 
@@ -168,7 +168,7 @@ def _within(point: OperatingPoint, freedom: Freedom) -> OperatingPoint:
     return point
 
 
-def _jacobian(chain: Chain, wanted: Wanted, here: FittedPoint, freedom: Freedom) -> Floats:
+def _jacobian(chain: Chain, wanted: MotionTarget, here: FittedPoint, freedom: Freedom) -> Floats:
     """Derivative of the residual by log drive, phase, links and omega, shape (2 n, P)."""
     if chain.feed_forward:
         slope = gradient(chain, setting_of(chain, [here.point]), here.response)

@@ -19,15 +19,15 @@ from .batch_march import BatchParts, march
 from .spread import (
     THRESHOLD,
     TOLERANCE,
+    FrameTarget,
     SpreadReport,
-    Wish,
     centre_of,
     draw,
     drawn_in,
+    frame_target,
     judge,
     known_spread,
     motion_of,
-    wish_of,
 )
 from .tone_march import march_tones
 
@@ -53,12 +53,14 @@ def expected_of(device: Device, amplitude: Floats, epsilon: Floats, lam: Floats,
     amplitude : float64, shape (P, n), wished, dimensionless. epsilon : (P,). lam : (P, n-1).
     """
     parts = draw(device.chain_length, count=FEW, seed=SEED).parts(device.chain, known_spread(device))
-    wishes = [Wish((one[None] / device.full_scale).astype(np.complex128), device.full_scale) for one in amplitude]
+    wishes = [
+        FrameTarget((one[None] / device.full_scale).astype(np.complex128), device.full_scale) for one in amplitude
+    ]
     held = zip(wishes, epsilon.tolist(), lam, strict=True)
     return float(np.mean([_report(wish, parts, drive, links, omega).expected for wish, drive, links in held]))
 
 
-def _report(wish: Wish, parts: BatchParts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
+def _report(wish: FrameTarget, parts: BatchParts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
     """Settings of one chain under drawn parts."""
     force = np.zeros((len(lam) + 1, 1, 1), dtype=np.complex128)
     force[0] = epsilon
@@ -185,7 +187,9 @@ class Expectation:
         if there[0].tones:
             return _toned(device, set_to[0], parts)
         ring = None if device.coupling.closure is Closure.OPEN else centre_of(device, places)
-        report = judge(wish_of(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD)
+        report = judge(
+            frame_target(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD
+        )
         noise = max(converter_error(device, one) for one in there)
         return _Drawn((report.error + noise / device.full_scale).astype(np.float32), report.right)
 
@@ -222,7 +226,7 @@ class Expectation:
     def _over_the_band(self, i: int, target: Floats) -> tuple[TradePoint, ...]:
         device, place = self._device, self._place(i)
         chain, parts = device.chain_at(*place), drawn_in(device, self._spread, [i], count=DRAWS, seed=SEED)
-        amplitude, wish = target * device.full_scale, Wish(target[None].astype(np.complex128), device.full_scale)
+        amplitude, wish = target * device.full_scale, FrameTarget(target[None].astype(np.complex128), device.full_scale)
         most = device.amplifier.volts * device.drive_per_volt(*place)
         points = []
         for omega in np.linspace(device.omega.min, device.omega.max, TRADED).tolist():

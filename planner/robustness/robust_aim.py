@@ -13,7 +13,7 @@ from ..closed_forms.links import drive_for, links_for
 from ..margins import WELL_SHARE
 from ..operating_point import OperatingPoint, setting_of
 from .robust_search import RobustSearch, TradeRow, Trial
-from .spread import THRESHOLD, TOLERANCE, Wish, known_spread
+from .spread import THRESHOLD, TOLERANCE, FrameTarget, known_spread
 
 __all__ = ["aim_for"]
 
@@ -42,7 +42,7 @@ def aim_for(device: Device, target: Floats, omega: float, chains: int) -> Floats
     float64, shape (n,), in units of full scale.
     """
     chain, wanted = device.chain, target * device.full_scale
-    wish = Wish(target[None].astype(np.complex128), device.full_scale)
+    wish = FrameTarget(target[None].astype(np.complex128), device.full_scale)
     trial = Trial(chain, wish, known_spread(device), TOLERANCE, THRESHOLD, JUDGED, SEED)
     search = RobustSearch(device, trial, trial.spread, min(chains, MOST_COPIES))
     nominal = OperatingPoint(float(drive_for(chain, wanted[:1], omega)[0]), links_for(chain, wanted, omega), omega)

@@ -13,7 +13,7 @@ from chainsim import Chain, Device
 
 from ..operating_point import OperatingPoint
 from .batch_march import BatchMotion, BatchParts, march
-from .spread import Draws, RelativeSpread, SpreadError, SpreadReport, Wish, draw, judge
+from .spread import Draws, FrameTarget, RelativeSpread, SpreadError, SpreadReport, draw, judge
 
 __all__ = ["RobustSearch", "TradeRow", "Trial"]
 
@@ -44,7 +44,7 @@ class Trial:
     """
 
     chain: Chain
-    wish: Wish
+    wish: FrameTarget
     spread: RelativeSpread
     tolerance: float
     threshold: float

@@ -19,18 +19,18 @@ __all__ = [
     "THRESHOLD",
     "TOLERANCE",
     "Draws",
+    "FrameTarget",
     "RelativeSpread",
     "SpreadError",
     "SpreadReport",
-    "Wish",
     "centre_of",
     "draw",
     "drawn_in",
+    "frame_target",
     "judge",
     "known_spread",
     "motion_of",
     "spread_of",
-    "wish_of",
 ]
 
 Floats = NDArray[np.float64]
@@ -138,7 +138,7 @@ def _normal(n: int, count: int, seed: int | tuple[int, ...], chains: int) -> Flo
 
 
 @dataclass(frozen=True)
-class Wish:
+class FrameTarget:
     """What the chains of a frame are to make felt.
 
     Attributes
@@ -242,7 +242,7 @@ class SpreadReport:
         return float(np.quantile(self.error, share))
 
 
-def judge(wish: Wish, motion: BatchMotion, *, tolerance: float, threshold: float) -> SpreadReport:
+def judge(wish: FrameTarget, motion: BatchMotion, *, tolerance: float, threshold: float) -> SpreadReport:
     """Compare motions of shape (n, chains, count) with a wish; `threshold` parts dots from no dots."""
     deviation = wish.deviation(motion.phasor)
     wanted = np.abs(wish.amplitude.T[:, :, None]) >= threshold
@@ -255,13 +255,13 @@ def judge(wish: Wish, motion: BatchMotion, *, tolerance: float, threshold: float
     return SpreadReport(error, right, tolerance)
 
 
-def wish_of(device: Device, states: Sequence[OperatingPoint]) -> Wish:
+def frame_target(device: Device, states: Sequence[OperatingPoint]) -> FrameTarget:
     """What planned states were planned for; chains at one frequency share their phase."""
     target = np.array([state.target for state in states])
     phase = np.array([np.full(len(state.target), np.nan) if state.phase is None else state.phase for state in states])
     matters = np.isfinite(phase)
     _, group = np.unique([state.omega for state in states], return_inverse=True)
-    return Wish(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
+    return FrameTarget(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
 
 
 def motion_of(states: Sequence[OperatingPoint], parts: BatchParts, ring: BatchParts | None = None) -> BatchMotion:
@@ -340,7 +340,7 @@ def spread_of(
     SpreadError
         For states as in `motion_of`.
     """
-    wish = wish_of(device, states)
+    wish = frame_target(device, states)
     parts = draw(device.chain_length, count=count, seed=seed, chains=len(states)).parts(device.chain, spread)
     ring = (
         None

@@ -7,7 +7,7 @@ import numpy as np
 from chainsim import Chain, Setting, solve
 
 from ..closed_forms.links import drive_for
-from ..closed_forms.wave_fit import Freedom, Wanted
+from ..closed_forms.wave_fit import Freedom, MotionTarget
 from ..operating_point import OperatingPoint
 
 __all__ = ["search"]
@@ -19,7 +19,7 @@ WEAKEST = 1e-3
 TOL = 1e-3
 
 
-def search(chain: Chain, wanted: Wanted, freedom: Freedom) -> list[OperatingPoint]:
+def search(chain: Chain, wanted: MotionTarget, freedom: Freedom) -> list[OperatingPoint]:
     """The settings of a random sweep that come nearest to the wish; links log-uniform, frequencies uniform."""
     rng = np.random.default_rng(SEED)
     low = max(freedom.lam_min, WEAKEST * freedom.lam_max, 1e-6)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.nearest import nearest_geometric
-from ..closed_forms.wave_fit import FittedPoint, Freedom, Wanted, fit
+from ..closed_forms.wave_fit import FittedPoint, Freedom, MotionTarget, fit
 from ..operating_point import OperatingPoint
 from ..targets import WaveTarget
 from .search import search
@@ -39,7 +39,7 @@ class _Guess:
     """Settings to begin with, and the phasors they are meant for."""
 
     point: OperatingPoint
-    wanted: Wanted
+    wanted: MotionTarget
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ class WaveFit:
         given = self.target.lam is not None or coupling.lam.min == coupling.lam.max
         return Freedom(0 if given else 1, coupling.lam.min, coupling.lam.max, omega.min, omega.max)
 
-    def wanted(self, share: float) -> Wanted:
+    def wanted(self, share: float) -> MotionTarget:
         """`share` of the target."""
         phasor = share * self.target.levels * self.device.full_scale * np.exp(1j * np.nan_to_num(self.target.phases))
-        return Wanted(phasor, self.phased, self.target.weights)
+        return MotionTarget(phasor, self.phased, self.target.weights)
 
     def stands(self, found: FittedPoint) -> bool:
         """Whether settings hold what they are meant for, and it is stable."""
@@ -123,12 +123,12 @@ class WaveFit:
                 bad = middle
         return None if kept is None else (good, kept)
 
-    def _least(self, found: list[FittedPoint], wanted: Wanted) -> FittedPoint:
+    def _least(self, found: list[FittedPoint], wanted: MotionTarget) -> FittedPoint:
         """The first that stands, else that with the least error."""
         real = [replace(one, error=wanted.error(one.phasor)) if np.isfinite(one.error) else one for one in found]
         return next((one for one in real if self.stands(one)), min(real, key=lambda one: one.error))
 
-    def _link_by_link(self, found: FittedPoint, wanted: Wanted) -> list[FittedPoint]:
+    def _link_by_link(self, found: FittedPoint, wanted: MotionTarget) -> list[FittedPoint]:
         """Every link for itself: from what was found for them all, and from a search."""
         each, chain = replace(self.freedom, lam=self.device.chain_length - 1), self.device.chain
         # Behind the last actuator that is to move, nothing is passed on.
@@ -140,7 +140,7 @@ class WaveFit:
             tries += [fit(chain, wanted, start, each) for start in search(chain, wanted, each)]
         return [self._rounded(one, wanted, each) for one in tries]
 
-    def _rounded(self, found: FittedPoint, wanted: Wanted, freedom: Freedom) -> FittedPoint:
+    def _rounded(self, found: FittedPoint, wanted: MotionTarget, freedom: Freedom) -> FittedPoint:
         """With every lam one that can be set, drive and frequency refitted."""
         coupling = self.device.coupling
         if not coupling.lam_step or not freedom.lam or not np.isfinite(found.error):
@@ -149,7 +149,7 @@ class WaveFit:
         point = replace(found.point, lam=coupling.lam.min + coupling.lam_step * steps)
         return fit(self.device.chain, wanted, point, replace(freedom, lam=0))
 
-    def _guesses(self, wanted: Wanted) -> list[_Guess]:
+    def _guesses(self, wanted: MotionTarget) -> list[_Guess]:
         """From the closed forms; where phases are free they are given, because a valley is slow to walk along."""
         chain, most = self.device.chain, self.freedom.lam_max
         if np.count_nonzero(self.phased) > 1:
@@ -166,7 +166,7 @@ class WaveFit:
             waves = self._waves(first, ratio, FREE_LAGS)
         return [self._own(wave, ratio, wanted) for wave in waves]
 
-    def _own(self, wave: OperatingPoint, ratio: float, wanted: Wanted) -> _Guess:
+    def _own(self, wave: OperatingPoint, ratio: float, wanted: MotionTarget) -> _Guess:
         """A wave as it is wanted: its own phases, and its own amplitudes."""
         chain, lam = self.device.chain, float(wave.lam[0])
         stage = lam / complex(1 - wave.omega**2 + 0.75 * chain.beta * wanted.scale**2 + lam, chain.delta * wave.omega)
@@ -177,7 +177,7 @@ class WaveFit:
             geometric = nearest_geometric(self.device, size, wanted.scale)
             size = geometric.first * geometric.ratio ** np.arange(chain.n)
         shape = size * lags * np.exp(1j * np.angle(first))
-        return _Guess(wave, Wanted(shape, np.ones(chain.n, dtype=np.bool_), wanted.weight))
+        return _Guess(wave, MotionTarget(shape, np.ones(chain.n, dtype=np.bool_), wanted.weight))
 
     def _waves(self, first: float, ratio: float, lags: tuple[float, ...]) -> list[OperatingPoint]:
         chain, amplitude = self.device.chain, max(first, LEAST_PART * self.scale)
