@@ -27,11 +27,13 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
 from encoders import Frame, GridShape, Scene, levels
-from planner import FramePlan, Spread, plan_scene, seconds_words, spread_of
-from planner.families import strategy_for
+from planner import FramePlan, RelativeSpread, plan_scene, seconds_words, spread_of
+from planner.families import family_of, row_of
+from planner.family import AmplitudeFamily
+from planner.targets import AmplitudeTarget
 
 KEPT = Path(__file__).resolve().parent / "results" / "planning.json"
-SEED, CONTRAST_DB, SPREAD = 0, 20.0, Spread(f0=0.01)
+SEED, CONTRAST_DB, SPREAD = 0, 20.0, RelativeSpread(f0=0.01)
 # What is looked at only once the code and its tables are in memory.
 WARM = 3
 
@@ -121,10 +123,10 @@ def measured() -> Iterator[Line]:
     plan = plan_scene(scene(linked, dots(linked, 60)), linked, contrast_db=CONTRAST_DB)
     list(plan.frames)
     yield line("a 6 x 6 frame whose rows are known", 1e-4, list(frame_times(plan.frames))[WARM:])
-    strategy = strategy_for(linked, CONTRAST_DB)
-    assert strategy is not None
+    family = family_of(row_of(AmplitudeTarget, linked), linked, CONTRAST_DB)
+    assert isinstance(family, AmplitudeFamily)
     rows = np.random.default_rng(SEED).uniform(0.1, 1.0, (10_000, 6))
-    yield line("10,000 random amplitude rows, nominal", 1.0, timed(lambda: strategy.states(rows), 5))
+    yield line("10,000 random amplitude rows, nominal", 1.0, timed(lambda: family.states(rows), 5))
     pages = dots(large, 12)
     plan = plan_scene(scene(large, pages), large, contrast_db=CONTRAST_DB)
     times = list(frame_times(plan.frames))

@@ -13,8 +13,9 @@ from typing import Any
 from chainsim import Device
 
 from .cache_file import CacheFile
+from .operating_point import OperatingPoint
 from .packed import packed, unpacked
-from .plan import ChainState, Ramp
+from .plan import Ramp
 
 __all__ = ["PlanCache", "cache_path"]
 
@@ -67,12 +68,12 @@ class PlanCache:
         rows = self._file.find(keys)
         return [_read(rows[key]) if key in rows else None for key in keys]
 
-    def keep(self, items: Iterable[tuple[bytes, ChainState | Ramp]]) -> None:
+    def keep(self, items: Iterable[tuple[bytes, OperatingPoint | Ramp]]) -> None:
         """Keep plans for later runs."""
         self._file.keep((self._key(item), packed(value)) for item, value in items)
 
 
-def _read(raw: bytes) -> ChainState | Ramp | None:
+def _read(raw: bytes) -> OperatingPoint | Ramp | None:
     """The plan; None where somebody else wrote the bytes."""
     try:
         return unpacked(raw)

@@ -1,35 +1,73 @@
-"""Which way of making amplitude patterns a device gets."""
+"""The families of patterns, and which of them makes a target on a device."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import NamedTuple
 
 from chainsim import Closure, Device
 
-from .strategy import Strategy
+from .family import PatternFamily
+from .targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget
 
-__all__ = ["strategy_for"]
+__all__ = ["FAMILIES", "Row", "family_of", "row_of"]
 
 
-def strategy_for(
-    device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: Strategy | None = None
-) -> Strategy | None:
-    """The strategy for amplitude patterns that `device` offers most with; None where it has none for any pattern.
+class Row(NamedTuple):
+    """A family: its name, the targets it makes on devices that `fits` says, and where its class is (loaded late)."""
 
-    A bias per actuator makes any pattern statically; a lam per link, or no coupling at all, any pattern by
-    vibration; anything else makes only waves.
+    name: str
+    targets: tuple[type[ChainTarget], ...]
+    fits: Callable[[Device], bool]
+    module: str
+    kind: str
+
+
+def _biased(device: Device) -> bool:
+    """Whether any pattern can be held statically."""
+    return device.bias == "actuator"
+
+
+def _single(device: Device) -> bool:
+    """Whether actuators are alone."""
+    return device.chain_length == 1
+
+
+def _linked(device: Device) -> bool:
+    """Whether any pattern can be made by vibration: with a lam per link, or without coupling."""
+    return _single(device) or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN)
+
+
+def _any(device: Device) -> bool:
+    return True
+
+
+# Of those that make a target the first.
+FAMILIES = (
+    Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
+    Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
+    Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
+    Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
+    Row("wave", (WaveTarget, AmplitudeTarget), _any, ".waves.wave_state", "Waves"),
+)
+
+
+def row_of(kind: type[ChainTarget], device: Device) -> Row:
+    """The family that makes targets of a kind on a device."""
+    return next(row for row in FAMILIES if kind in row.targets and row.fits(device))
+
+
+def family_of(
+    row: Row, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: PatternFamily | None = None
+) -> PatternFamily:
+    """A family on a device, ready to be asked.
 
     Parameters
     ----------
-    kinds : the chains of a device whose chains have numbers of their own, each as a device. whole : the strategy of
-        such a device when `device` is one of them.
+    contrast_db : how far an unraised dot of a vibrating chain stays below a raised one.
+    kinds : the chains of a device whose chains have numbers of their own, each as a device. whole : the family on such
+        a device when `device` is one of them.
     """
-    if device.bias == "actuator":
-        from .amplitudes.deflection import Deflection
-
-        return Deflection(device)
-    if device.chain_length == 1 or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN):
-        from .amplitudes.vibration import Vibration
-
-        return Vibration(device, contrast_db, kinds, whole if isinstance(whole, Vibration) else None)
-    return None
+    family: type[PatternFamily] = getattr(import_module(row.module, __package__), row.kind)
+    return family.of(device, contrast_db, kinds, whole)

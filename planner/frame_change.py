@@ -9,8 +9,10 @@ import numpy as np
 
 from chainsim import Outcome
 
-from .chains import Chains, Held
-from .plan import ChainState, Ramp
+from .memory import Memory
+from .operating_point import OperatingPoint
+from .plan import Ramp
+from .targets import AmplitudeTarget, ChainTarget
 
 __all__ = ["Change", "change_to"]
 
@@ -19,51 +21,55 @@ __all__ = ["Change", "change_to"]
 class Change:
     """What every chain holds after a change, and its way there; row by row, chain by chain."""
 
-    held: list[Held]
-    states: tuple[ChainState, ...]
+    targets: list[ChainTarget]
+    states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
 
 
-def change_to(chains: Chains, before: list[Held], after: list[Held]) -> Change:
+def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> Change:
     """The change from what chains hold to what they are to hold."""
-    device = chains.device
+    device = memory.device
     if device.coupling.scope == "device" and device.chain_length > 1:
-        after = _one_lam(chains, after)
-    states = [chains.state(held) for held in after]
+        after = _one_lam(memory, after)
+    states = memory.states(after)
     if device.drive == "device":
         states = _one_drive(states)
     if any(state.outcome is not Outcome.OK for state in states):
         # What cannot be held is not played: no ways are looked for.
         return Change(after, tuple(states), (None,) * len(states))
-    moves = _moves(chains, before, after)
-    chains.prepare(list(zip(before, after, strict=True)), moves)
+    moves = _moves(memory, before, after)
     # Where lam is common, all waves begin to rise together.
-    common = device.coupling.scope == "device" and any(map(chains.waving, after))
-    wait_s = max((chains.leaving_s(one, moves) for one in before), default=0.0) if common and before != after else 0.0
-    ramps = [chains.ramp(one, other, moves, wait_s) for one, other in zip(before, after, strict=True)]
+    common = device.coupling.scope == "device" and any(map(_wave, after))
+    wait_s = memory.leaving_s(before, moves) if common and before != after else 0.0
+    ramps = memory.ramps(before, after, moves, wait_s)
     if device.coupling.scope == "device" and device.chain_length > 1:
-        return _all_alike(chains, before, Change(after, tuple(states), tuple(ramps)), moves)
+        return _all_alike(memory, before, Change(after, tuple(states), tuple(ramps)), moves)
     return Change(after, tuple(states), tuple(ramps))
 
 
-def _moves(chains: Chains, before: list[Held], after: list[Held]) -> bool:
+def _moves(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> bool:
     """Whether lam may differ on the way from what it is at the ends: one lam for all only if all go one way."""
-    scope = chains.device.coupling.scope
+    scope = memory.device.coupling.scope
     if scope != "device":
         return scope in ("chain", "link")
-    ends = zip(map(chains.waving, before), map(chains.waving, after), strict=True)
-    return len({way for way in ends if way != (b"", b"")}) <= 1
+    ends = zip(map(_wave, before), map(_wave, after), strict=True)
+    return len({way for way in ends if way != (None, None)}) <= 1
 
 
-def _one_lam(chains: Chains, after: list[Held]) -> list[Held]:
-    """Wishes planned again under the lam of the first chain that is driven, where theirs differ."""
-    driven = [state.lam[0] for state in map(chains.state, after) if state.moving]
+def _wave(target: ChainTarget) -> ChainTarget | None:
+    """What moves under one lam, but for its turn; None for amplitudes at will."""
+    return None if isinstance(target, AmplitudeTarget) else target.unturned
+
+
+def _one_lam(memory: Memory, after: list[ChainTarget]) -> list[ChainTarget]:
+    """Targets planned again under the lam of the first chain that is driven, where theirs differ."""
+    driven = [state.lam[0] for state in memory.states(after) if state.moving]
     if len(set(driven)) < 2:
         return after
-    return [chains.under(held, float(driven[0])) for held in after]
+    return memory.under(after, float(driven[0]))
 
 
-def _one_drive(states: list[ChainState]) -> list[ChainState]:
+def _one_drive(states: list[OperatingPoint]) -> list[OperatingPoint]:
     """States as they are when all chains are driven like most of those that are driven."""
     driven = [(state.epsilon, state.omega) for state in states if state.moving]
     if not driven or (len(driven) == len(states) and len(set(driven)) == 1):
@@ -73,7 +79,7 @@ def _one_drive(states: list[ChainState]) -> list[ChainState]:
     return [_driven_like(state, model) for state in states]
 
 
-def _driven_like(state: ChainState, model: ChainState) -> ChainState:
+def _driven_like(state: OperatingPoint, model: OperatingPoint) -> OperatingPoint:
     scale = float(np.abs(model.phasor).max()) / max(float(model.target.max()), 1e-12)
     reached = np.abs(model.phasor) / scale
     away = np.abs(reached - state.target)
@@ -86,9 +92,9 @@ def _driven_like(state: ChainState, model: ChainState) -> ChainState:
     )  # fmt: skip
 
 
-def _all_alike(chains: Chains, before: list[Held], change: Change, moves: bool) -> Change:
+def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves: bool) -> Change:
     """Every chain under the one lam, resting ones too, on the way and after it."""
-    old = [chains.state(held) for held in before]
+    old = memory.states(before)
     moving = [state for state in change.states if state.moving]
     still = [state for state in change.states if np.any(state.bias)]
     lams = {float(state.lam[0]) for state in (*moving, *still)}
@@ -100,7 +106,7 @@ def _all_alike(chains: Chains, before: list[Held], change: Change, moves: bool) 
         return replace(change, states=states)
     states = change.states
     if lams:
-        lam = np.full(chains.device.chain_length - 1, lams.pop())
+        lam = np.full(memory.device.chain_length - 1, lams.pop())
         idle = [not state.moving and not np.any(state.bias) for state in states]
         states = tuple(replace(state, lam=lam) if rests else state for state, rests in zip(states, idle, strict=True))
     changed = {float(state.lam[0]) for state in old if state.moving or np.any(state.bias)} | {

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device, Response
 
 from .closed_forms.links import stages
-from .closed_forms.wave_fit import Hold
-from .plan import Margins
+from .operating_point import Margins, OperatingPoint
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
 
@@ -43,7 +42,7 @@ def lacking_of(margins: Margins) -> str:
     return ""
 
 
-def converter_error(device: Device, hold: Hold) -> float:
+def converter_error(device: Device, point: OperatingPoint) -> float:
     """Standard deviation of the worst actuator's amplitude under the rounding of a converter, dimensionless.
 
     Rounding adds noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error
@@ -52,7 +51,7 @@ def converter_error(device: Device, hold: Hold) -> float:
     step = device.amplifier.volt_step * device.epsilon_per_volt
     if not step:
         return 0.0
-    lam = np.concatenate([[0.0], hold.lam])
+    lam = np.concatenate([[0.0], point.lam])
     if device.coupling.closure is Closure.RING:
         lam[0] = lam[1]
     own = stages(device.chain)

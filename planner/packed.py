@@ -12,12 +12,13 @@ import numpy as np
 
 from chainsim import Outcome
 
-from .plan import ChainState, Margins, Ramp, Tone, ToneRamp
+from .operating_point import Margins, OperatingPoint, PointTone
+from .plan import Ramp, ToneRamp
 
 __all__ = ["packed", "unpacked"]
 
 
-def packed(value: ChainState | Ramp) -> bytes:
+def packed(value: OperatingPoint | Ramp) -> bytes:
     """Plain values as a line of JSON, then the arrays as NPY; no pickle."""
     arrays: list[np.ndarray[Any, Any]] = []
     plain = _plain(value, arrays)
@@ -47,7 +48,7 @@ def _empty(header: bytes) -> np.ndarray[Any, Any]:
     return np.empty(shape, dtype)
 
 
-_PARTS = {kind.__name__: kind for kind in (ChainState, Margins, Ramp, Tone, ToneRamp)}
+_PARTS = {kind.__name__: kind for kind in (OperatingPoint, Margins, Ramp, PointTone, ToneRamp)}
 
 
 def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
@@ -63,7 +64,7 @@ def _plain(item: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
     return [_plain(one, arrays) for one in item] if isinstance(item, tuple) else item
 
 
-def unpacked(raw: bytes) -> ChainState | Ramp:
+def unpacked(raw: bytes) -> OperatingPoint | Ramp:
     """What `packed` made bytes of.
 
     Raises
@@ -82,7 +83,7 @@ def unpacked(raw: bytes) -> ChainState | Ramp:
         array = np.frombuffer(raw[begin:at], kind.dtype).reshape(kind.shape)
         arrays.append(array)
     value = _whole(plain, arrays)
-    if not isinstance(value, ChainState | Ramp):
+    if not isinstance(value, OperatingPoint | Ramp):
         raise ValueError("neither a state nor a ramp")
     return value
 

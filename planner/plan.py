@@ -12,93 +12,13 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import Frame
 
+from .operating_point import OperatingPoint
 from .outlook import FrameSpread
 
-__all__ = ["ChainState", "FramePlan", "Margins", "Plan", "Ramp", "Tone", "ToneRamp"]
+__all__ = ["FramePlan", "Plan", "Ramp", "ToneRamp"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-
-
-@dataclass(frozen=True)
-class Margins:
-    """How far a state stays from what it must not reach, and what it is sensitive to.
-
-    Attributes
-    ----------
-    volts : peak voltage over the amplifier's; 1 is at the limit.
-    well : of a deflection the largest bias over the bias of the static fold, of a vibration the largest
-        deflection over that of the hilltop; 1 is at the limit, 0 unless beta < 0.
-    noise_gain : how many times more a disturbance on the drive, at the worst frequency and lasting for
-        ever, is magnified than the drive itself is, at the worst actuator; 1 where nothing vibrates.
-    slew : fastest change of the steady drive over the amplifier's; 1 is at the limit.
-    multiplier : modulus of the largest Floquet multiplier of the motion; below 1 where it is stable, 0 where
-        nothing vibrates or no multipliers are known.
-    """
-
-    volts: float
-    well: float
-    noise_gain: float = 1.0
-    slew: float = 0.0
-    multiplier: float = 0.0
-
-
-@dataclass(frozen=True)
-class Tone:
-    """One more tone of a drive: force = Re(epsilon e^{i omega tau}), tau from the start of the whole plan.
-
-    Attributes
-    ----------
-    phasor : complex128, shape (n,), predicted amplitudes at omega, dimensionless.
-    side : it is not itself wanted, but keeps those that are at their amplitudes.
-    """
-
-    omega: float
-    epsilon: complex
-    phasor: Complexes
-    side: bool = False
-
-
-@dataclass(frozen=True)
-class ChainState:
-    """What one chain of n actuators holds while a frame stands.
-
-    Drive and links are what the device is set to, in the units of its profile; what actuators and links that were
-    measured make of them, the device says.
-
-    Attributes
-    ----------
-    target : float64, shape (n,), the amplitude that is to be felt, in units of full scale (floor included).
-    epsilon : complex drive phasor (modulus = drive amplitude, argument = psi).
-    lam : float64, shape (n-1,), links. omega : drive frequency over f0 (1.0 where nothing vibrates).
-    bias : float64, shape (n,), DC force on each actuator.
-    phasor : complex128, shape (n,), predicted first harmonic, dimensionless. mean : float64, shape (n,).
-    error : predicted worst deviation from `target`, in units of full scale.
-    phase : float64, shape (n,), wanted phases in radians, NaN where any will do; None where none matters. Phases
-        are those of the motion at omega; one that is common to all chains at that omega makes no difference.
-    tones : further tones of the drive; `target` is then the largest amplitude that passes by, which the tones
-        make in equal parts, side tones apart.
-    lacking : one clause on what the device lacks for the target, empty when it can make it or the strategy says it.
-    """
-
-    target: Floats
-    epsilon: complex
-    lam: Floats
-    bias: Floats
-    omega: float
-    phasor: Complexes
-    mean: Floats
-    error: float
-    margins: Margins
-    outcome: Outcome
-    phase: Floats | None = None
-    tones: tuple[Tone, ...] = ()
-    lacking: str = ""
-
-    @property
-    def moving(self) -> bool:
-        """Whether the target is an amplitude of vibration, not a deflection."""
-        return bool(self.epsilon) or bool(self.tones)
 
 
 @dataclass(frozen=True)
@@ -164,7 +84,7 @@ class FramePlan:
     start_s: float
     settled_s: float
     end_s: float
-    states: tuple[ChainState, ...]
+    states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
     outcome: Outcome = Outcome.OK
     note: str = ""

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 from chainsim import Device, Outcome
 from encoders import Frame, Scene
 
-from .chains import Chains
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
 from .frame_change import Change, change_to
-from .plan import ChainState, FramePlan, Plan
+from .memory import Memory
+from .operating_point import OperatingPoint
+from .plan import FramePlan, Plan
+from .targets import AmplitudeTarget
 
 if TYPE_CHECKING:
     from .robustness.expected import Expectation
@@ -48,12 +50,12 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CON
     return Plan(device, _Frames(scene, device, contrast_db), scene.encoding)
 
 
-def _chains_of(device: Device, contrast_db: float) -> Chains:
+def _memory_of(device: Device, contrast_db: float) -> Memory:
     if not device.actuators:
-        return Chains(device, contrast_db)
-    from .unequal import UnequalChains
+        return Memory(device, contrast_db)
+    from .unequal import UnequalMemory
 
-    return UnequalChains(device, contrast_db)
+    return UnequalMemory(device, contrast_db)
 
 
 class _Frames:
@@ -61,7 +63,7 @@ class _Frames:
 
     def __init__(self, scene: Scene, device: Device, contrast_db: float) -> None:
         self._scene = scene
-        self._chains = _chains_of(device, contrast_db)
+        self._memory = _memory_of(device, contrast_db)
         self._device = device
         self._expected: Expectation | None = None
         if device.spread is not None:
@@ -70,19 +72,19 @@ class _Frames:
             self._expected = Expectation(device)
 
     def __iter__(self) -> Iterator[FramePlan]:
-        device, chains = self._device, self._chains
+        device, memory = self._device, self._memory
         rate = device.amplifier.rate_hz
-        held = chains.at_rest
+        targets = memory.at_rest
         position = 0
         for frame in self._scene.frames:
-            change = change_to(chains, held, chains.hold(frame.pattern, held))
+            change = change_to(memory, targets, memory.hold(frame.pattern, targets))
             # What cannot be held is not played, and the next frame begins at rest.
             played = all(state.outcome is Outcome.OK for state in change.states)
-            held = change.held if played else chains.at_rest
+            targets = change.targets if played else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
             position += samples
-        change = change_to(chains, held, chains.at_rest)
+        change = change_to(memory, targets, memory.at_rest)
         if any(ramp is not None for ramp in change.ramps):
             longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
             yield self._frame(None, position, int(longest * rate) + 2, change)
@@ -99,7 +101,7 @@ class _Frames:
         whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
-        return replace(whole, spread=self._expected.of(change.held, change.states))
+        return replace(whole, spread=self._expected.of(change.targets, change.states))
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
@@ -111,9 +113,9 @@ class _Frames:
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
         return plan
 
-    def _note(self, state: ChainState) -> str:
+    def _note(self, state: OperatingPoint) -> str:
         if state.outcome is not Outcome.UNREACHABLE:
             return state.outcome.sentence
         if state.lacking:
             return f"{self._device.name} cannot make this pattern: {state.lacking}."
-        return "" if self._chains.strategy is None else self._chains.strategy.note()
+        return self._memory.planner.family(AmplitudeTarget).note()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from chainsim import Device
 
-from .robustness.spread import Spread, known_spread
+from .robustness.spread import RelativeSpread, known_spread
 
 __all__ = ["HigherMode", "Surroundings", "assumed"]
 
@@ -51,7 +51,7 @@ class Surroundings:
     modes: tuple[HigherMode, ...] = ()
     row_lam: float = 0.0
     bandwidth_hz: float = math.inf
-    spread: Spread = field(default_factory=Spread)
+    spread: RelativeSpread = field(default_factory=RelativeSpread)
 
 
 def assumed(device: Device) -> Surroundings:
@@ -67,5 +67,6 @@ def assumed(device: Device) -> Surroundings:
     )
     return Surroundings(
         hysteresis=0.1, saturation=0.1 * device.epsilon_max, creep_per_decade=0.02, creep_first_s=0.1, modes=modes,
-        bandwidth_hz=device.amplifier.rate_hz / 2, spread=known_spread(device) if device.spread else Spread(f0=0.01),
+        bandwidth_hz=device.amplifier.rate_hz / 2,
+        spread=known_spread(device) if device.spread else RelativeSpread(f0=0.01),
     )  # fmt: skip

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +11,12 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import TargetPattern
 
-from .chains import MOST_STATES, Chains
-from .families import strategy_for
-from .held import Held
-from .plan import ChainState, Ramp
-from .strategy import Strategy
-from .wish import wishes_of
+from .memory import MOST_STATES, Memory
+from .operating_point import OperatingPoint
+from .plan import Ramp
+from .targets import ChainTarget, targets_of
 
-__all__ = ["UnequalChains"]
+__all__ = ["UnequalMemory"]
 
 Floats = NDArray[np.float64]
 
@@ -29,11 +26,10 @@ SLACK = 1e-9
 TOLD = 5e-4
 
 
-class UnequalChains(Chains):
-    """As `Chains`, with the numbers of each chain; chains of the same numbers are one kind, planned once."""
+class UnequalMemory(Memory):
+    """As `Memory`, with the numbers of each chain; chains of the same numbers are one kind, planned once."""
 
     def __init__(self, device: Device, contrast_db: float) -> None:
-        super().__init__(device, contrast_db)
         self._alone: list[Device] = []
         self._units: list[Floats | float] = []
         self._kind_at: list[int] = []
@@ -47,40 +43,31 @@ class UnequalChains(Chains):
                     own = device.coupling.scope == "link"
                     self._units.append(device.lam_gain(row, index) if own else device.lam_unit(row, index))
                 self._kind_at.append(kind)
-        self._chains = [Chains(alone, contrast_db, self, kind) for kind, alone in enumerate(self._alone)]
-        self._set: dict[Held, ChainState] = {}
-        self._set_ramps: dict[tuple[Held, Held, bool, float], Ramp | None] = {}
+        super().__init__(device, contrast_db, self._alone)
+        self._of_kind = [Memory(alone, contrast_db, whole=self) for alone in self._alone]
+        self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
+        self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
 
-    @cached_property
-    def strategy(self) -> Strategy | None:
-        """The way to make amplitudes at will, with what all kinds of chain have in common."""
-        return strategy_for(self.device, self._contrast_db, self._alone)
-
-    @property
-    def at_rest(self) -> list[Held]:
-        """All chains of the device at rest."""
-        return [self._chains[kind].rest for kind in self._kind_at]
-
-    def hold(self, pattern: TargetPattern, before: list[Held]) -> list[Held]:
+    def hold(self, pattern: TargetPattern, before: Sequence[ChainTarget]) -> list[ChainTarget]:
         """What chains hold for a pattern, given what they held."""
-        wishes = zip(self._kind_at, wishes_of(pattern, self.device), before, strict=True)
-        held = [self._chains[kind]._hold(wish, one) for kind, wish, one in wishes]
-        keys = defaultdict(list)
-        for one in held:
-            keys[one.kind].append(one.key)
-        for kind, of_kind in keys.items():
-            self._chains[kind]._plan(of_kind)
-        return held
+        wanted = zip(self._kind_at, targets_of(pattern, self.device), before, strict=True)
+        targets = [self._of_kind[kind].held(target, one) for kind, target, one in wanted]
+        for kind, memory in enumerate(self._of_kind):
+            memory.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
+        return targets
 
-    def state(self, held: Held) -> ChainState:
-        """The state for what is held, as the device is set to it."""
-        if held not in self._set:
+    def states(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """The states for what chains hold, as the device is set to them."""
+        return [self._set_to(kind, target) for kind, target in zip(self._kind_at, targets, strict=True)]
+
+    def _set_to(self, kind: int, target: ChainTarget) -> OperatingPoint:
+        if (kind, target) not in self._set:
             if len(self._set) >= MOST_STATES:
                 self._set.clear()
-            self._set[held] = self._state(held.kind, self._chains[held.kind].state(held))
-        return self._set[held]
+            self._set[(kind, target)] = self._state(kind, self._of_kind[kind].state(target))
+        return self._set[(kind, target)]
 
-    def _state(self, kind: int, state: ChainState) -> ChainState:
+    def _state(self, kind: int, state: OperatingPoint) -> OperatingPoint:
         gain, span = self._drive(kind), self.device.coupling.lam
         tones = tuple(replace(tone, epsilon=tone.epsilon * gain) for tone in state.tones)
         lam = state.lam / self._units[kind]
@@ -93,15 +80,15 @@ class UnequalChains(Chains):
             return replace(done, outcome=Outcome.UNREACHABLE, lacking=lacking)
         return self._under_one_lam(kind, state, done)
 
-    def _under_one_lam(self, kind: int, state: ChainState, done: ChainState) -> ChainState:
+    def _under_one_lam(self, kind: int, state: OperatingPoint, done: OperatingPoint) -> OperatingPoint:
         """A wave as it is when links differ that have one lam: it was planned for their mean."""
         device = self._alone[kind]
         gain = device.lam_gain(0)
         if device.coupling.scope == "link" or not state.epsilon or state.tones or np.all(gain == 1.0):
             return done
-        from .closed_forms.wave_fit import Hold, response_to
+        from .closed_forms.wave_fit import response_to
 
-        real = response_to(device.chain, Hold(state.epsilon, state.lam * gain, state.omega), state.phasor).phasor[0]
+        real = response_to(device.chain, replace(state, lam=state.lam * gain), state.phasor).phasor[0]
         away = float(np.abs(real - state.phasor).max())
         if away <= TOLD * float(np.abs(state.phasor).max()):
             return replace(done, error=done.error + away / device.full_scale)
@@ -120,21 +107,38 @@ class UnequalChains(Chains):
         slack = SLACK * (span.max - span.min)
         return bool(lam.size and (lam.min() < span.min - slack or lam.max() > span.max + slack))
 
-    def under(self, held: Held, lam: float) -> Held:
-        """What is held, with its links given as they are set."""
-        return self._chains[held.kind].under(held, lam * float(np.mean(self._units[held.kind])))
+    def under(self, targets: Sequence[ChainTarget], lam: float) -> list[ChainTarget]:
+        """What chains hold, with their links given as they are set."""
+        units = [float(np.mean(unit)) for unit in self._units]
+        return [target.under(lam * units[kind]) for kind, target in zip(self._kind_at, targets, strict=True)]
 
-    def ramp(self, before: Held, after: Held, moves: bool, wait_s: float = 0.0) -> Ramp | None:
-        """The way from one to the other, as the device is set on it; None where a chain already stands."""
-        ask = (before, after, moves, wait_s)
+    def leaving_s(self, targets: Sequence[ChainTarget], moves: bool) -> float:
+        """Seconds until all chains have come to rest."""
+        return max(
+            (self._of_kind[kind].leaving_s([one], moves) for kind, one in zip(self._kind_at, targets, strict=True)),
+            default=0.0,
+        )
+
+    def ramps(
+        self, before: Sequence[ChainTarget], after: Sequence[ChainTarget], moves: bool, wait_s: float
+    ) -> list[Ramp | None]:
+        """The ways from one to the other, as the device is set on them; None where a chain already stands."""
+        pairs = list(zip(self._kind_at, before, after, strict=True))
+        for kind, memory in enumerate(self._of_kind):
+            same = [(one, other) for at, one, other in pairs if at == kind]
+            memory.prepare_ramps(same, moves)
+        return [self._set_ramp(kind, one, other, moves, wait_s) for kind, one, other in pairs]
+
+    def _set_ramp(self, kind: int, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float) -> Ramp | None:
+        ask = (kind, before, after, moves, wait_s)
         if ask not in self._set_ramps:
             if len(self._set_ramps) >= MOST_STATES:
                 self._set_ramps.clear()
-            ramp = self._chains[before.kind].ramp(*ask)
-            self._set_ramps[ask] = None if ramp is None else self._ramp(before.kind, ramp)
+            ramp = self._of_kind[kind].ramp(before, after, moves, wait_s)
+            self._set_ramps[ask] = None if ramp is None else self._as_set(kind, ramp)
         return self._set_ramps[ask]
 
-    def _ramp(self, kind: int, ramp: Ramp) -> Ramp:
+    def _as_set(self, kind: int, ramp: Ramp) -> Ramp:
         gain, span = self._drive(kind), self.device.coupling.lam
         tones = tuple(
             replace(
@@ -154,11 +158,3 @@ class UnequalChains(Chains):
         if not lacking and self._beyond(lam):
             lacking = f"the change takes links set to {lam.min():.3g}..{lam.max():.3g}; it lacks range of lam"
         return replace(ramp, lam=np.clip(lam, span.min, span.max), lacking=lacking)
-
-    def prepare(self, pairs: list[tuple[Held, Held]], moves: bool) -> None:
-        """Plan many ways between amplitudes at once."""
-        of_kind = defaultdict(list)
-        for pair in pairs:
-            of_kind[pair[0].kind].append(pair)
-        for kind, same in of_kind.items():
-            self._chains[kind].prepare(same, moves)

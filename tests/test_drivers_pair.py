@@ -35,7 +35,7 @@ from drivers import (
     write_waveform,
 )
 from encoders import Frame, TargetPattern
-from planner import ChainState, FramePlan, Margins, Plan, Ramp
+from planner import FramePlan, Margins, OperatingPoint, Plan, Ramp
 
 NAMES = ["linked-6x6", "paper-6x6", "independent-6x6", "linked-40x96"]
 PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
@@ -57,9 +57,9 @@ def load(name: str) -> Device:
     )
 
 
-def levels(device: Device, level: float, lam: float, omega: float = 1.25) -> ChainState:
+def levels(device: Device, level: float, lam: float, omega: float = 1.25) -> OperatingPoint:
     n, biased = device.chain_length, device.bias == "actuator"
-    return ChainState(
+    return OperatingPoint(
         target=np.full(n, level / 3), epsilon=0j if biased else 0.05j * level, lam=np.full(n - 1, lam),
         bias=np.full(n, 0.1 * level if biased else 0.0), omega=omega, phasor=np.zeros(n, dtype=np.complex128),
         mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,

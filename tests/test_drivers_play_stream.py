@@ -29,7 +29,7 @@ from drivers.safety import GateLimits, pass_gate
 from drivers.sinks.serial_play import NoAnswer, run_session
 from drivers.sinks.uart import PortUnavailable, Uart, serial_ports
 from encoders import Frame, TargetPattern
-from planner import ChainState, FramePlan, Margins, Plan, Ramp
+from planner import FramePlan, Margins, OperatingPoint, Plan, Ramp
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 
@@ -43,12 +43,12 @@ def dots(device: Device, seed: int) -> np.ndarray:
 def plan_of(device: Device, frames: int, dwell_s: float) -> Plan:
     """Random dots: biases where the device has them, else one tone a chain and links that glide."""
 
-    def states(number: int) -> list[ChainState]:
+    def states(number: int) -> list[OperatingPoint]:
         on = dots(device, number) * (number < frames)
         biased = device.bias == "actuator"
         n = device.chain_length
         return [
-            ChainState(
+            OperatingPoint(
                 target=part, epsilon=0j if biased else (0.05 + 0.02j) * (number < frames),
                 lam=np.full(n - 1, device.coupling.lam.max * (0.3 + 0.05 * number % 0.5)),
                 bias=0.13 * part if biased else np.zeros(n), omega=1.05, phasor=np.zeros(n, dtype=np.complex128),
@@ -234,11 +234,11 @@ def test_nobody_answers(tmp_path: Path) -> None:
 HOST = """
 import sys
 from drivers import read_waveform
-from drivers.gate import GateLimits
-from drivers.outgoing import session_messages
-from drivers.serial_play import run_session
-from drivers.stream import HostSession, Timing
-from drivers.uart import Uart
+from drivers.safety import GateLimits
+from drivers.protocol.outgoing import session_messages
+from drivers.sinks.serial_play import run_session
+from drivers.protocol.host_session import HostSession, Timing
+from drivers.sinks.uart import Uart
 
 manifest, reader = read_waveform(sys.argv[2])
 limits = GateLimits.of(manifest.device, len(manifest.channels))

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from chainsim import Amplifier, Device, Outcome, Span, load_device
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
 from drivers.waveform.coupling import CouplingWriter, LamTrack
-from drivers.waveform.hold import hold_inverse
 from drivers.waveform.timeline import Stretch
 from encoders import Frame, TargetPattern
-from planner import ChainState, FramePlan, Margins, Plan, Ramp
+from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
 
 PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
 NAMES = ["linked-6x6", "paper-6x6", "independent-6x6", "linked-40x96"]
@@ -41,9 +40,11 @@ def load(name: str) -> Device:
     )
 
 
-def state(device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float = 0.0, bias: float = 0.0) -> ChainState:
+def state(
+    device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float = 0.0, bias: float = 0.0
+) -> OperatingPoint:
     n = device.chain_length
-    return ChainState(
+    return OperatingPoint(
         target=np.ones(n), epsilon=epsilon, lam=np.full(n - 1, lam), bias=np.full(n, bias), omega=omega,
         phasor=np.zeros(n, dtype=np.complex128), mean=np.zeros(n), error=0.0, margins=Margins(0.0, 0.0),
         outcome=Outcome.OK,
@@ -51,7 +52,7 @@ def state(device: Device, epsilon: complex = 0j, omega: float = 1.0, lam: float 
 
 
 def frame(
-    device: Device, start_s: float, end_s: float, states: list[ChainState], ramps: list[Ramp | None] | None = None
+    device: Device, start_s: float, end_s: float, states: list[OperatingPoint], ramps: list[Ramp | None] | None = None
 ) -> FramePlan:
     count = device.rows * device.chains_per_row
     states = states * (count // len(states))
@@ -130,11 +131,11 @@ def expected_volts(plan: Plan, sample: int) -> list[float]:
     for held, ramp in zip(current.states, current.ramps, strict=True):
         rising = ramp is not None and since < ramp.t_s[-1]
         envelope = between(since, ramp.t_s, ramp.epsilon, ramp.epsilon_slope) if rising else held.epsilon
-        gain, lead = hold_inverse(held.omega, 2 * math.pi * device.f0_hz / rate)
-        envelope *= gain
+        hold = FirstOrderHold.of(held.omega, 2 * math.pi * device.f0_hz / rate)
+        envelope *= hold.gain
         if rising and ramp.epsilon_slope is not None:
             slope = np.interp(since, ramp.t_s, ramp.epsilon_slope) / (2 * math.pi * device.f0_hz)
-            envelope += 1j * lead * slope
+            envelope += 1j * hold.lead * slope
         drives.append((envelope * cmath.exp(1j * held.omega * tau)).real / device.epsilon_per_volt)
         for m in range(device.chain_length if device.bias == "actuator" else 0):
             tilt = None if ramp is None or ramp.bias_slope is None else ramp.bias_slope[:, m]
@@ -184,7 +185,7 @@ def test_the_hundredth_hour_is_as_exact_as_the_first_second() -> None:
     got = waveform._chunk(Stretch(late, 0, 360000 * 8000), index)[0]
     # The phase in whole cycles, in integers: f = 133.13 * 1.25 Hz = 1664125 / 10^4.
     cycles = (index.astype(object) * 1664125 % (10**4 * 8000)).astype(float) / (10**4 * 8000)
-    gain, _ = hold_inverse(1.25, device.tau_per_s / 8000)
+    gain = FirstOrderHold.of(1.25, device.tau_per_s / 8000).gain
     np.testing.assert_allclose(got, 25 * gain * np.cos(2 * np.pi * cycles), atol=25 * 1e-6)
 
 
@@ -192,11 +193,11 @@ def test_the_hundredth_hour_is_as_exact_as_the_first_second() -> None:
 def test_straight_lines_between_the_samples_carry_the_envelope(rate: int) -> None:
     """A modulated carrier through a first-order hold: what a narrow band around it keeps is the envelope."""
     omega, tau_per_s, length = 1.2, 2 * math.pi * 133.13, 4.0
-    gain, lead = hold_inverse(omega, tau_per_s / rate)
+    hold = FirstOrderHold.of(omega, tau_per_s / rate)
     at = np.arange(int(length * rate)) / rate
     envelope = np.exp(-(((at - 2.0) / 0.4) ** 2)) * np.exp(2j * np.pi * 3 * at)
     slope = envelope * (-2 * (at - 2.0) / 0.16 + 6j * np.pi) / tau_per_s
-    held = ((gain * envelope + 1j * lead * slope) * np.exp(1j * omega * tau_per_s * at)).real
+    held = (hold.raised(envelope, slope) * np.exp(1j * omega * tau_per_s * at)).real
     fine = np.arange(int(length * 48000)) / 48000
     lines = np.interp(fine, at, held)
     spectrum = np.fft.fft(lines * np.exp(-1j * omega * tau_per_s * fine))
@@ -206,7 +207,7 @@ def test_straight_lines_between_the_samples_carry_the_envelope(rate: int) -> Non
     inside = np.abs(fine - 2.0) < 1.2
     plain = np.abs(kept - wanted)[inside].max()
     assert plain < 2e-4
-    assert plain < (gain - 1) / 20
+    assert plain < (hold.gain - 1) / 20
 
 
 def test_idle_chains_are_exactly_zero_and_constant_bias_is_exact() -> None:
@@ -358,7 +359,7 @@ def test_a_jump_from_rest_at_the_first_sample_counts_as_slew() -> None:
 
 def test_the_drive_limit_itself_is_allowed() -> None:
     device = load("linked-6x6")
-    gain, _ = hold_inverse(0.9, device.tau_per_s / device.amplifier.rate_hz)
+    gain = FirstOrderHold.of(0.9, device.tau_per_s / device.amplifier.rate_hz).gain
     held = state(device, device.epsilon_max / gain * cmath.exp(0.3j), omega=0.9)
     rise = Ramp(np.array([0.0, 0.05]), epsilon=np.array([0, held.epsilon]))
     volts = whole(Waveform.of(Plan(device, [frame(device, 0.0, 1.0, [held], [rise] * 6)], {})))

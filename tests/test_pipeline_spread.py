@@ -15,7 +15,7 @@ from dotwave.reports.scene import SceneReport
 from dotwave.verification import verify
 from planner.closed_forms.links import drive_for, links_for
 from planner.robustness.batch_march import march
-from planner.robustness.spread import Spread, drawn_in
+from planner.robustness.spread import RelativeSpread, drawn_in
 
 DEVICE = load_device("linked-6x6")
 PROFILE = [1, 1, 0.1, 0.1, 1, 1]
@@ -44,7 +44,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneReport, Pat
 def nominal_median(omega: float) -> float:
     """Of the same frame on the same draws, held exactly at one frequency."""
     amplitude = DEVICE.full_scale * np.array(PROFILE)
-    parts = drawn_in(DEVICE, Spread(f0=0.01), range(6), count=1000, seed=0)
+    parts = drawn_in(DEVICE, RelativeSpread(f0=0.01), range(6), count=1000, seed=0)
     force = np.zeros((6, 1, 1), dtype=np.complex128)
     force[0] = drive_for(DEVICE.chain, amplitude[:1], omega)[0]
     lam = np.append(0.0, links_for(DEVICE.chain, amplitude, omega))[:, None, None]

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from chainsim import Device, load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
-from planner import ChainState, FramePlan, Ramp, plan_scene
+from planner import FramePlan, OperatingPoint, Ramp, plan_scene
 from planner.amplitudes.deflection import Deflection
 from planner.amplitudes.vibration import Vibration
 from planner.cache import PlanCache, cache_path
-from planner.strategy import Strategy
+from planner.family import AmplitudeFamily
 
 ROOT = Path(__file__).resolve().parent.parent
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")
@@ -43,16 +43,18 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """How many states and ramps were computed so far."""
     done = {"states": 0, "ramps": 0}
 
-    def counting(kind: type[Strategy]) -> None:
+    def counting(kind: type[AmplitudeFamily]) -> None:
         plain_states, plain_ramps = kind.states, kind.ramps
 
-        def states(self: Strategy, targets: NDArray[np.float64]) -> list[ChainState]:
+        def states(self: AmplitudeFamily, targets: NDArray[np.float64]) -> list[OperatingPoint]:
             done["states"] += len(targets)
             return plain_states(self, targets)
 
-        def ramps(self: Strategy, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+        def ramps(
+            self: AmplitudeFamily, before: list[OperatingPoint], after: list[OperatingPoint], moves: bool
+        ) -> list[Ramp | None]:
             done["ramps"] += len(after)
-            return plain_ramps(self, before, after)
+            return plain_ramps(self, before, after, moves)
 
         monkeypatch.setattr(kind, "states", states)
         monkeypatch.setattr(kind, "ramps", ramps)
@@ -72,7 +74,7 @@ def same(one: object, other: object) -> bool:
         return one.dtype == other.dtype and np.array_equal(one, other)
     if isinstance(one, tuple):
         return len(one) == len(other) and all(same(a, b) for a, b in zip(one, other, strict=True))
-    if isinstance(one, ChainState | Ramp):
+    if isinstance(one, OperatingPoint | Ramp):
         return type(one) is type(other) and all(same(v, vars(other)[k]) for k, v in vars(one).items())
     if isinstance(one, FramePlan):
         return all(same(v, vars(other)[k]) for k, v in vars(one).items())
@@ -266,7 +268,7 @@ def test_what_is_kept_is_plain(device: Device) -> None:
     assert len(values) > 20
     for value in values:
         head, arrays = value.split(b"\n", 1)
-        assert json.loads(head)["type"] in {"ChainState", "Ramp"}
+        assert json.loads(head)["type"] in {"OperatingPoint", "Ramp"}
         assert arrays.startswith(b"\x93NUMPY")
         assert b"'|O'" not in arrays
         with pytest.raises(ValueError, match="opcode"):

@@ -13,14 +13,14 @@ import pytest
 
 from chainsim import load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
-from planner import ChainState, FramePlan, Ramp, plan_scene
+from planner import FramePlan, OperatingPoint, Ramp, plan_scene
 from planner.amplitudes.vibration import Vibration
 from planner.cache import PlanCache, cache_path
 from planner.cache_file import digest_of
 
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")
 CONTRAST_DB = 20.0
-Items = list[tuple[bytes, ChainState | Ramp]]
+Items = list[tuple[bytes, OperatingPoint | Ramp]]
 
 
 @pytest.fixture(autouse=True)
@@ -44,7 +44,7 @@ def same(one: object, other: object) -> bool:
         return isinstance(other, np.ndarray) and one.dtype == other.dtype and np.array_equal(one, other)
     if isinstance(one, tuple):
         return isinstance(other, tuple) and len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, ChainState | Ramp | FramePlan):
+    if isinstance(one, OperatingPoint | Ramp | FramePlan):
         return type(one) is type(other) and all(same(value, vars(other)[name]) for name, value in vars(one).items())
     return one is other or one == other
 

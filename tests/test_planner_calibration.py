@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, solve
 from planner.identification.calibration import FEWEST_POINTS, ChainFit, Sweep, SweepError, fit_chain
-from planner.robustness.batch_march import Parts, march
+from planner.robustness.batch_march import BatchParts, march
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Truth:
         """Up and down at each drive, every point on the branch of the one before while it lasts."""
         natural, delta, beta, feed = self.numbers[:, :, None]
         n = len(natural)
-        parts = Parts(natural**2, delta, beta, np.ones((n, 1)))
+        parts = BatchParts(natural**2, delta, beta, np.ones((n, 1)))
         lam = np.concatenate([np.zeros((1, 1)), feed[1:]])
         shots = []
         for drive in volts:

@@ -15,7 +15,8 @@ from scipy.interpolate import CubicHermiteSpline
 from chainsim import Closure, Device, Outcome, Span, load_device
 from planner import Ramp
 from planner.amplitudes.deflection import Deflection
-from planner.families import strategy_for
+from planner.families import family_of, row_of
+from planner.targets import AmplitudeTarget
 
 PAPER = load_device("paper-6x6")
 ROWS = np.array(list(product((0.0, 1.0), repeat=6)))
@@ -37,8 +38,8 @@ def force_at_rest(device: Device, z: Floats, bias: Floats) -> Floats:
     return lam * (before - z) + bias - z - device.beta * z**3
 
 
-def test_it_is_the_strategy_of_a_device_with_biases() -> None:
-    assert isinstance(strategy_for(PAPER, 20.0), Deflection)
+def test_it_is_the_family_of_a_device_with_biases() -> None:
+    assert isinstance(family_of(row_of(AmplitudeTarget, PAPER), PAPER, 20.0), Deflection)
 
 
 @pytest.mark.parametrize("lam_min", [0.0, 0.01, 0.05])
@@ -83,12 +84,12 @@ def test_margins_in_closed_form() -> None:
 def test_beyond_the_fold_nothing_stands(beta: float, share: float, outcome: Outcome) -> None:
     """Beyond the fold the bias that balances is below the static limit but unstable; near it there is no margin."""
     device = altered(full_scale=share / math.sqrt(-3 * beta), beta=beta, bias_per_volt=0.01)
-    strategy = Deflection(device)
-    states = strategy.states(np.array([[0.0] * 6, [1.0] * 6, [0, 0, 0, 0, 0, 1.0]]))
+    family = Deflection(device)
+    states = family.states(np.array([[0.0] * 6, [1.0] * 6, [0, 0, 0, 0, 0, 1.0]]))
     assert [state.outcome for state in states] == [Outcome.OK, outcome, outcome]
     if outcome is Outcome.UNREACHABLE:
         assert "lacks depth of the well" in states[1].lacking
-        assert "softening well" in strategy.note()
+        assert "softening well" in family.note()
 
 
 def test_without_volts_it_is_unreachable() -> None:
@@ -112,11 +113,11 @@ def test_a_ring_that_howls_is_not_called_ok() -> None:
 
 
 def ramp_between(device: Device, before: Floats, after: Floats) -> Ramp:
-    strategy = Deflection(device)
-    one, other = strategy.states(np.array([before, after], dtype=np.float64))
-    (ramp,) = strategy.ramps([one], [other])
+    family = Deflection(device)
+    one, other = family.states(np.array([before, after], dtype=np.float64))
+    (ramp,) = family.ramps([one], [other])
     assert ramp is not None
-    assert ramp.duration_s == strategy.ramp_s
+    assert ramp.duration_s == family.ramp_s
     np.testing.assert_allclose(ramp.bias[0], one.bias, atol=1e-15)
     np.testing.assert_allclose(ramp.bias[-1], other.bias, atol=1e-15)
     return ramp
@@ -185,8 +186,8 @@ def test_bias_and_slope_are_what_the_motion_asks_for(lam_min: float) -> None:
 
 
 def test_what_stands_needs_no_ramp() -> None:
-    strategy = Deflection(PAPER)
-    states = strategy.states(ROWS[:4])
-    ramps = strategy.ramps(states, [states[0], states[2], states[2], states[1]])
+    family = Deflection(PAPER)
+    states = family.states(ROWS[:4])
+    ramps = family.ramps(states, [states[0], states[2], states[2], states[1]])
     assert [ramp is None for ramp in ramps] == [True, False, True, False]
-    assert strategy.ramp_s < 0.1
+    assert family.ramp_s < 0.1

@@ -16,17 +16,26 @@ from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import FramePlan, Plan, plan_scene
 from planner.amplitudes.band import choose_band
 from planner.amplitudes.vibration import Vibration
-from planner.chains import Chains
 from planner.closed_forms.links import drive_for, links_for
-from planner.held import Held
+from planner.memory import Memory
+from planner.operating_point import OperatingPoint
 from planner.outlook import FrameSpread
 from planner.robustness import expected as expected_module
 from planner.robustness.expected import WANTED, Expectation
 from planner.robustness.robust_aim import aim_for
-from planner.robustness.robust_search import Held as Settings, Search, Trial
-from planner.robustness.spread import THRESHOLD, TOLERANCE, Spread, Wish, drawn_in, judge, motion_of, wish_of
+from planner.robustness.robust_search import RobustSearch, Trial
+from planner.robustness.spread import (
+    THRESHOLD,
+    TOLERANCE,
+    FrameTarget,
+    RelativeSpread,
+    drawn_in,
+    frame_target,
+    judge,
+    motion_of,
+)
+from planner.targets import WalkingTarget
 from planner.waves.walking import walking_state
-from planner.wish import ChainWish
 
 Floats = NDArray[np.float64]
 
@@ -85,11 +94,11 @@ def test_a_frame_is_as_good_as_its_rows_drawn_together() -> None:
     """Row by row and kept, or all at once: the same draws, the same answer."""
     device = spread(LINKED)
     frame = planned(device, DOTS)[0]
-    chains = Chains(device, 20.0)
-    held = chains.hold(TargetPattern(DOTS.astype(np.complex128)), chains.at_rest)
-    there = [replace(state, target=np.frombuffer(one.key)) for one, state in zip(held, frame.states, strict=True)]
-    motion = motion_of(there, drawn_in(device, Spread(f0=0.01), range(6), count=1000, seed=0))
-    report = judge(wish_of(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
+    memory = Memory(device, 20.0)
+    held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
+    there = [replace(state, target=one.levels) for one, state in zip(held, frame.states, strict=True)]
+    motion = motion_of(there, drawn_in(device, RelativeSpread(f0=0.01), range(6), count=1000, seed=0))
+    report = judge(frame_target(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
     assert of(frame).expected == pytest.approx(report.expected, rel=1e-6)
     assert of(frame).yield_ == pytest.approx(report.yield_, abs=2e-3)
 
@@ -104,9 +113,9 @@ def test_known_rows_are_not_judged_again(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(expected_module, "drawn_in", counting)
     device = spread(PAPER)
-    chains, expectation = Chains(device, 20.0), Expectation(device)
-    held = chains.hold(TargetPattern(DOTS.astype(np.complex128)), chains.at_rest)
-    states = [chains.state(one) for one in held]
+    memory, expectation = Memory(device, 20.0), Expectation(device)
+    held = memory.hold(TargetPattern(DOTS.astype(np.complex128)), memory.at_rest)
+    states = memory.states(held)
     first = expectation.of(held, states)
     busy = sum(bool(state.bias.any()) for state in states)
     assert counted == busy
@@ -127,9 +136,9 @@ def test_the_accuracy_needed_is_enough_and_twice_of_it_is_not() -> None:
 def test_a_wave_over_weak_links_is_told_what_it_needs() -> None:
     wave = 0.1 * np.exp(-0.5j * np.pi * np.arange(6))[None].repeat(6, axis=0)
     device = spread(PAPER, 0.01)
-    chains = Chains(device, 20.0)
-    held = chains.hold(TargetPattern(wave, phase_matters=True), chains.at_rest)
-    states = [chains.state(one) for one in held]
+    memory = Memory(device, 20.0)
+    held = memory.hold(TargetPattern(wave, phase_matters=True), memory.at_rest)
+    states = memory.states(held)
     assert all(state.outcome is Outcome.OK for state in states)
     found = Expectation(device).of(held, states)
     assert found is not None
@@ -145,10 +154,10 @@ def test_bars_that_walk_are_judged_tone_by_tone(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(expected_module, "DRAWS", 60)
     device = spread(PAPER, 1e-3)
     n = 6
-    wish = ChainWish(np.full(n, 0.1), np.full(n, np.nan), np.ones(n), width=2.0)
-    state = walking_state(device, wish)
+    target = WalkingTarget((0.1,) * n, weight=(1.0,) * n, width=2.0)
+    state = walking_state(device, target)
     assert state.outcome is Outcome.OK, state.lacking
-    held = [Held(wish.key)] * 6
+    held = [target] * 6
     loose, tight = (Expectation(spread(PAPER, s)).of(held, [state] * 6) for s in (1e-3, 1e-6))
     assert loose is not None
     assert tight is not None
@@ -157,18 +166,20 @@ def test_bars_that_walk_are_judged_tone_by_tone(monkeypatch: pytest.MonkeyPatch)
     assert loose.expected > 20 * tight.expected
 
 
-def settings(device: Device, amplitude: Floats, omega: float) -> Settings:
+def settings(device: Device, amplitude: Floats, omega: float) -> OperatingPoint:
     chain = device.chain
-    return Settings(float(drive_for(chain, amplitude[:1], omega)[0]), links_for(chain, amplitude, omega), omega)
+    return OperatingPoint(float(drive_for(chain, amplitude[:1], omega)[0]), links_for(chain, amplitude, omega), omega)
 
 
 def test_the_worst_of_several_copies_is_what_it_says() -> None:
     device = spread(LINKED).alone(0)
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.05), Spread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0)
+    trial = Trial(
+        device.chain, FrameTarget(PROFILE[None] + 0j, 0.05), RelativeSpread(f0=0.01), TOLERANCE, THRESHOLD, 10, 0
+    )
     errors = np.random.default_rng(0).exponential(size=500)
-    assert Search(device, trial, trial.spread).worst_of(errors) == pytest.approx(errors.mean())
+    assert RobustSearch(device, trial, trial.spread).worst_of(errors) == pytest.approx(errors.mean())
     drawn = np.random.default_rng(1).choice(errors, (200_000, 4)).max(axis=1)
-    assert Search(device, trial, trial.spread, 4).worst_of(errors) == pytest.approx(drawn.mean(), rel=0.01)
+    assert RobustSearch(device, trial, trial.spread, 4).worst_of(errors) == pytest.approx(drawn.mean(), rel=0.01)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -176,8 +187,16 @@ def test_an_aim_is_never_worse_than_the_wish_on_fresh_draws(seed: int) -> None:
     device, omega = spread(LINKED).alone(0), 1.35
     target = np.random.default_rng(seed).choice([0.1, 1.0], 6)
     aim = aim_for(device, target, omega, 1)
-    trial = Trial(device.chain, Wish(target[None] + 0j, 0.05), Spread(f0=0.01), TOLERANCE, THRESHOLD, 2000, 99 + seed)
-    search = Search(device, trial, trial.spread)
+    trial = Trial(
+        device.chain,
+        FrameTarget(target[None] + 0j, 0.05),
+        RelativeSpread(f0=0.01),
+        TOLERANCE,
+        THRESHOLD,
+        2000,
+        99 + seed,
+    )
+    search = RobustSearch(device, trial, trial.spread)
     wished, aimed = (search.row(settings(device, one * 0.05, omega)).report.expected for one in (target, aim))
     assert aimed <= wished * 1.01
 

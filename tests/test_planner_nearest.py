@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
 from planner.closed_forms.nearest import nearest_geometric
-from planner.families import strategy_for
+from planner.families import row_of
+from planner.targets import AmplitudeTarget, WaveTarget
 from planner.waves.wave_state import wave_state
-from planner.wish import ChainWish
 
 RING = load_device("paper-6x6-ring")
 OPEN = load_device("paper-6x6").model_copy(update={"bias": "none"})
@@ -36,8 +36,8 @@ def least_misfit(target: Floats, steepest: float) -> float:
     return float(np.min(np.sum((heights * shapes - target) ** 2, axis=2)))
 
 
-def wish(target: list[float]) -> ChainWish:
-    return ChainWish(np.array(target, dtype=np.float64), np.full(6, np.nan), np.ones(6))
+def free(amplitude: list[float]) -> WaveTarget:
+    return WaveTarget(tuple(map(float, amplitude)), phase=(None,) * 6, weight=(1.0,) * 6)
 
 
 @devices
@@ -52,22 +52,22 @@ def test_the_nearest_is_the_best_there_is(device: Device, target: tuple[float, .
     assert np.all(near <= 1 + 1e-12)
 
 
-def test_such_devices_have_no_strategy_for_patterns_at_will() -> None:
-    assert strategy_for(RING, 20.0) is None
-    assert strategy_for(OPEN, 20.0) is None
+def test_such_devices_make_waves_of_amplitudes() -> None:
+    assert row_of(AmplitudeTarget, RING).name == "wave"
+    assert row_of(AmplitudeTarget, OPEN).name == "wave"
 
 
 @devices
 def test_equal_amplitudes_and_a_single_first_dot_are_made(device: Device) -> None:
     for target in ([0.7] * 6, [0.7, 0, 0, 0, 0, 0]):
-        state = wave_state(device, wish(target))
+        state = wave_state(device, free(target))
         assert state.outcome is Outcome.OK
         np.testing.assert_allclose(np.abs(state.phasor) / device.full_scale, target, atol=1e-4)
 
 
 @devices
 def test_other_patterns_are_unreachable_with_the_nearest(device: Device) -> None:
-    state = wave_state(device, wish([1, 0, 1, 1, 0, 1]))
+    state = wave_state(device, free([1, 0, 1, 1, 0, 1]))
     shape = "ring" if device is RING else "chain"
     assert state.outcome is Outcome.UNREACHABLE
     assert f"one lam and one drive per {shape}" in state.lacking or "stable" in state.lacking
@@ -78,7 +78,7 @@ def test_other_patterns_are_unreachable_with_the_nearest(device: Device) -> None
 
 
 def test_a_ring_with_a_lam_per_link_is_not_told_to_get_one() -> None:
-    state = wave_state(LINKED_RING, wish([1, 0.3, 1, 0.2, 0.4, 1]))
+    state = wave_state(LINKED_RING, free([1, 0.3, 1, 0.2, 0.4, 1]))
     assert state.outcome is Outcome.UNREACHABLE
     assert "lam per link" not in state.lacking
     assert "one lam" not in state.lacking

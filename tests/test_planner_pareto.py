@@ -15,9 +15,10 @@ from encoders import GridShape, levels, plane_wave, walking_bars
 from planner.analysis.pareto import RAMPS_S, pareto_of
 from planner.analysis.pareto_point import ALIKE, RESOLUTION, ParetoError, ParetoPoint, front_of
 from planner.analysis.pareto_still import PERIODS, ways_of_deflections
+from planner.targets import targets_of
 from planner.transitions.waves import enter_wave
+from planner.waves.wave_fit import GOOD
 from planner.waves.wave_state import wave_state
-from planner.wish import wishes_of
 
 SHAPE = GridShape(6, 6)
 ROW = [1, 1, 0, 0, 1, 1]
@@ -172,8 +173,8 @@ def test_waves_trade_time_against_drive():
     for fast, slow in itertools.pairwise(found.points):
         assert fast.ramp_s < slow.ramp_s
         assert fast.drive > slow.drive
-    wish = next(iter(wishes_of(pattern, device))).wish
-    planned = enter_wave(device, wave_state(device, wish), True)
+    target = next(iter(targets_of(pattern, device)))
+    planned = enter_wave(device, wave_state(device, target), True, GOOD)
     assert found.points[0].ramp_s == planned.duration_s
     assert found.points[0].drive == pytest.approx(np.abs(planned.epsilon).max() / device.epsilon_max)
     assert all(point.error <= 2e-3 for point in found.points)

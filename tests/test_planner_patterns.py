@@ -27,7 +27,7 @@ from encoders import (
     walking_bars,
 )  # fmt: skip
 from planner import DwellTooShort, FramePlan, Plan, plan_scene
-from planner.closed_forms.wave_fit import Hold, response_to
+from planner.closed_forms.wave_fit import response_to
 from planner.waves.wave_forms import wave_for
 
 NAMES = ["paper-6x6", "paper-6x6-common", "linked-6x6", "independent-6x6", "ultrasonic-6x6", "paper-6x6-ring"]
@@ -114,9 +114,9 @@ class Trial:
         device, row = self.device, self.pattern.amplitude[0] * self.device.full_scale
         lag = float(-np.angle(row[1] / row[0]))
         wave = wave_for(device.chain, amplitude=abs(row[0]), lag=lag)
-        inside = device.coupling.lam.min <= wave.lam <= device.coupling.lam.max
+        inside = device.coupling.lam.min <= wave.lam[0] <= device.coupling.lam.max
         inside &= device.omega.min <= wave.omega <= device.omega.max
-        held = response_to(device.chain, Hold(wave.epsilon, np.full(5, wave.lam), wave.omega), row)
+        held = response_to(device.chain, wave, row)
         away = np.abs(held.phasor[0] * np.exp(1j * np.angle(row[0])) - row).max() / abs(row[0])
         return bool(inside and held.outcome[0] is Outcome.OK and held.stable[0] and away < EXACT)
 

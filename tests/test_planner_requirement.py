@@ -12,8 +12,8 @@ from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, l
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
 from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
-from planner import ChainState, FramePlan, Margins, Spread, Tone, plan_scene, spread_of
-from planner.analysis.effects import StandingChain
+from planner import FramePlan, OperatingPoint, PointTone, RelativeSpread, plan_scene, spread_of
+from planner.analysis.effects import Linearisation
 from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
 from planner.surroundings import HigherMode, Surroundings, assumed
@@ -35,9 +35,9 @@ def held(device, setting, *, phase=None):
         return None
     drive = complex(setting.epsilon[0] * np.exp(1j * setting.phase[0]))
     felt = response.phasor[0] if drive else np.zeros(device.chain_length, complex)
-    return ChainState(
-        np.abs(felt + response.mean[0]) / device.full_scale, drive, setting.lam[0, 1:], setting.bias[0],
-        float(setting.omega[0]), felt, response.mean[0], 0.0, Margins(0.0, 0.0), Outcome.OK, phase,
+    return OperatingPoint(
+        drive, setting.lam[0, 1:], float(setting.omega[0]), felt, mean=response.mean[0], bias=setting.bias[0],
+        target=np.abs(felt + response.mean[0]) / device.full_scale, phase=phase,
     )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def random_surroundings(rng, device, force):
         preload=size(1e-5, 1e-1), hysteresis=size(1e-6, 1e-1), saturation=force * size(1e-2, 10),
         creep_per_decade=size(1e-6, 1e-1), creep_first_s=size(10, 100) / device.tau_per_s,
         modes=(HigherMode(4.965, 5 * device.delta, size(1e-6, 3)),), bandwidth_hz=device.f0_hz * size(1, 50),
-        spread=Spread(f0=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
+        spread=RelativeSpread(f0=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
     )  # fmt: skip
 
 
@@ -216,7 +216,7 @@ def test_third_harmonic_is_what_one_harmonic_is_off_by(closure):
     coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
     device = device_of(3, coupling=coupling)
     device, state = vibrating(device=device, lam=0.02, omega=0.97)
-    moved = StandingChain.of(device, state).without_third()[0]
+    moved = Linearisation(device.chain, state).without_third()[0]
     setting = setting_of(device, state, NOTHING)
     if closure == "open":
         one = solve(device.chain, setting, tol=1e-3, rung="one_harmonic", start="rest").phasor[0]
@@ -229,7 +229,7 @@ def test_third_harmonic_is_what_one_harmonic_is_off_by(closure):
 def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
     coupling = {"closure": closure, "scope": "chain", "lam": {"min": 0.0, "max": 1.0}}
     device, state = vibrating(device=device_of(3, coupling=coupling), lam=0.02, omega=0.95)
-    standing = StandingChain.of(device, state)
+    standing = Linearisation(device.chain, state)
     setting = setting_of(device, state, NOTHING)
     more = Setting.of(device.chain, epsilon=1.001 * setting.epsilon, lam=state.lam[0], omega=setting.omega)
     before, after = (solve(device.chain, one, tol=1e-11, start="rest").phasor[0] for one in (setting, more))
@@ -240,7 +240,12 @@ def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
 
 def test_spread_is_what_draws_scatter_by():
     device, state = vibrating(amplitude=0.05, device=device_of(4, rows=1))
-    for spread in (Spread(f0=1e-4), Spread(delta=1e-3), Spread(beta=1e-3), Spread(lam=1e-4)):
+    for spread in (
+        RelativeSpread(f0=1e-4),
+        RelativeSpread(delta=1e-3),
+        RelativeSpread(beta=1e-3),
+        RelativeSpread(lam=1e-4),
+    ):
         sigma = effects(device, [state], Surroundings(spread=spread))["spread"] / 2
         report = spread_of(device, [state], spread, tolerance=1.0, threshold=0.5, count=4000)
         worst = report.error * device.full_scale / np.abs(state.phasor).max()
@@ -317,8 +322,8 @@ def test_the_way_in_counts_for_half_of_its_time():
 def test_tones_and_what_they_add_up_to():
     device, first = vibrating(amplitude=0.03, lam=0.05, omega=0.95)
     _, second = vibrating(amplitude=0.03, lam=0.05, omega=1.12)
-    both = replace(first, tones=(Tone(second.omega, second.epsilon, second.phasor),))
-    standing = StandingChain.of(device, both)
+    both = replace(first, tones=(PointTone(second.omega, second.epsilon, second.phasor),))
+    standing = Linearisation(device.chain, both)
     assert standing.size == pytest.approx(np.abs(first.phasor) + np.abs(second.phasor))
     for change, state in zip(standing.without_cubic(), (first, second), strict=True):
         linear = solve(device.chain, setting_of(device, state, NOTHING), tol=1e-6, rung="linear", start="rest")

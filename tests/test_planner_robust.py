@@ -12,23 +12,24 @@ from numpy.typing import NDArray
 from chainsim import Chain, Outcome, Setting, load_device, solve
 from planner.amplitudes.vibration import Vibration
 from planner.closed_forms.links import drive_for, links_for
-from planner.robustness.robust import Held, RobustError, RobustPlan, Trial, accuracy_needed, hold, robust_plan
-from planner.robustness.robust_search import Search
-from planner.robustness.spread import Spread, Wish, draw, spread_of
+from planner.operating_point import OperatingPoint
+from planner.robustness.robust import RobustError, RobustPlan, Trial, accuracy_needed, robust_plan
+from planner.robustness.robust_search import RobustSearch
+from planner.robustness.spread import FrameTarget, RelativeSpread, draw, spread_of
 
 Floats = NDArray[np.float64]
 
 DEVICE = load_device("linked-6x6")
 CHAIN = DEVICE.chain
 PROFILE = np.array([1, 1, 0.1, 0.1, 1, 1])
-WISH = Wish(PROFILE[None] + 0j, DEVICE.full_scale)
-TRIAL = Trial(CHAIN, WISH, Spread(f0=0.01), tolerance=0.2, threshold=0.5, count=1000, seed=0)
+WISH = FrameTarget(PROFILE[None] + 0j, DEVICE.full_scale)
+TRIAL = Trial(CHAIN, WISH, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=1000, seed=0)
 WELL = 0.8
 
 
-def closed_form(omega: float, profile: Floats = PROFILE) -> Held:
+def closed_form(omega: float, profile: Floats = PROFILE) -> OperatingPoint:
     amplitude = DEVICE.full_scale * profile
-    return Held(float(drive_for(CHAIN, amplitude[:1], omega)[0]), links_for(CHAIN, amplitude, omega), omega)
+    return OperatingPoint(float(drive_for(CHAIN, amplitude[:1], omega)[0]), links_for(CHAIN, amplitude, omega), omega)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def found() -> RobustPlan:
 def test_one_percent_in_natural_frequency_costs_at_most_a_third_of_the_nominal_error(found: RobustPlan) -> None:
     assert found.nominal.report.median > 0.5
     assert found.robust.report.median <= found.nominal.report.median / 3
-    assert found.robust.held.epsilon <= DEVICE.epsilon_max
+    assert found.robust.point.epsilon <= DEVICE.epsilon_max
     assert found.robust.well < WELL
     assert found.robust.report.yield_ > found.nominal.report.yield_
 
@@ -52,7 +53,7 @@ def test_harmonic_balance_confirms_both_medians(found: RobustPlan) -> None:
         errors = []
         for j in range(60):
             chain = Chain.of(6, delta=CHAIN.delta, beta=CHAIN.beta, stiffness=parts.stiffness[:, 0, j])
-            setting = Setting.of(chain, epsilon=row.held.epsilon, lam=[row.held.lam], omega=row.held.omega)
+            setting = Setting.of(chain, epsilon=row.point.epsilon, lam=[row.point.lam], omega=row.point.omega)
             response = solve(chain, setting, tol=1e-6, rung="harmonic_balance", start="rest")
             assert response.outcome[0] is Outcome.OK
             errors.append(np.abs(np.abs(response.phasor[0]) / DEVICE.full_scale - PROFILE).max())
@@ -62,7 +63,7 @@ def test_harmonic_balance_confirms_both_medians(found: RobustPlan) -> None:
 
 
 def test_the_trade_shows_robustness_bought_with_drive(found: RobustPlan) -> None:
-    omega = [row.held.omega for row in found.trade]
+    omega = [row.point.omega for row in found.trade]
     volts = [row.volts for row in found.trade]
     expected = [row.report.expected for row in found.trade]
     assert len(found.trade) >= 6
@@ -72,8 +73,8 @@ def test_the_trade_shows_robustness_bought_with_drive(found: RobustPlan) -> None
     assert found.robust.report.expected <= min(expected)
     allowed = DEVICE.coupling.lam
     for row in (*found.trade, found.robust):
-        assert DEVICE.omega.min <= row.held.omega <= DEVICE.omega.max
-        assert np.all((row.held.lam >= allowed.min) & (row.held.lam <= allowed.max))
+        assert DEVICE.omega.min <= row.point.omega <= DEVICE.omega.max
+        assert np.all((row.point.lam >= allowed.min) & (row.point.lam <= allowed.max))
         assert row.volts <= 1
 
 
@@ -84,7 +85,7 @@ def test_the_table_and_the_json_say_the_same(found: RobustPlan) -> None:
     assert lines[-1].endswith("robust")
     plain = found.as_dict()
     assert f"{plain['robust']['median']:.4f}" in lines[-1]
-    assert plain["robust"]["lam"] == found.robust.held.lam.tolist()
+    assert plain["robust"]["lam"] == found.robust.point.lam.tolist()
     assert len(plain["trade"]) == len(found.trade)
 
 
@@ -92,14 +93,14 @@ def test_fewer_volts_leave_less_robustness() -> None:
     poor = DEVICE.model_copy(update={"amplifier": DEVICE.amplifier.model_copy(update={"volts": 8.0})})
     rich = robust_plan(DEVICE, TRIAL, closed_form(math.sqrt(1.06)), well_share=WELL).robust
     found = robust_plan(poor, TRIAL, closed_form(math.sqrt(1.06)), well_share=WELL)
-    assert found.robust.held.epsilon <= poor.epsilon_max * (1 + 1e-12)
+    assert found.robust.point.epsilon <= poor.epsilon_max * (1 + 1e-12)
     assert found.nominal.report.expected > found.robust.report.expected > 1.2 * rich.report.expected
 
 
 @pytest.mark.parametrize("phase_matters", [False, True])
 def test_the_gradient_is_a_finite_difference(phase_matters: bool) -> None:
-    wish = Wish(PROFILE[None] * np.exp(1j * np.arange(6)), DEVICE.full_scale, phase_matters)
-    search = Search(DEVICE, replace(TRIAL, wish=wish), Spread(f0=0.01, delta=0.1, beta=0.1, lam=0.05))
+    wish = FrameTarget(PROFILE[None] * np.exp(1j * np.arange(6)), DEVICE.full_scale, phase_matters)
+    search = RobustSearch(DEVICE, replace(TRIAL, wish=wish), RelativeSpread(f0=0.01, delta=0.1, beta=0.1, lam=0.05))
     held = closed_form(1.2)
     x, h = np.array([*np.log([held.epsilon, *held.lam]), held.omega]), 1e-7
     _, found = search._expected(x, held)
@@ -108,7 +109,7 @@ def test_the_gradient_is_a_finite_difference(phase_matters: bool) -> None:
 
 
 def test_a_searched_setting_is_never_worse_on_its_own_draws() -> None:
-    search = Search(DEVICE, TRIAL, TRIAL.spread)
+    search = RobustSearch(DEVICE, TRIAL, TRIAL.spread)
     rng = np.random.default_rng(0)
     for _ in range(5):
         start = closed_form(rng.uniform(1.1, 1.35), rng.uniform(0.1, 1.0, 6))
@@ -120,7 +121,7 @@ def test_a_searched_setting_is_never_worse_on_its_own_draws() -> None:
 
 
 def test_without_spread_the_robust_setting_is_the_nominal_one() -> None:
-    trial = replace(TRIAL, spread=Spread())
+    trial = replace(TRIAL, spread=RelativeSpread())
     plan = robust_plan(DEVICE, trial, closed_form(1.3), well_share=WELL)
     assert plan.robust.nominal_error < 1e-12
     assert plan.robust.report.yield_ == 1.0
@@ -134,11 +135,11 @@ def test_a_measured_chain_is_planned_exactly() -> None:
             6, delta=CHAIN.delta * rng.uniform(0.8, 1.2, 6), beta=-rng.uniform(0.8, 1.2, 6),
             stiffness=(1 + 0.01 * rng.standard_normal(6)) ** 2,
         )  # fmt: skip
-        search = Search(DEVICE, replace(TRIAL, chain=chain, tolerance=0.01), Spread(f0=1e-4))
+        search = RobustSearch(DEVICE, replace(TRIAL, chain=chain, tolerance=0.01), RelativeSpread(f0=1e-4))
         blind, known = search.row(closed_form(1.35)), search.row(search.least(closed_form(1.35), free_omega=False))
         assert blind.report.yield_ == 0.0
         assert known.report.yield_ >= 0.98
-        setting = Setting.of(chain, epsilon=known.held.epsilon, lam=[known.held.lam], omega=1.35)
+        setting = Setting.of(chain, epsilon=known.point.epsilon, lam=[known.point.lam], omega=1.35)
         felt = np.abs(solve(chain, setting, tol=1e-8, rung="harmonic_balance", start="rest").phasor[0])
         assert np.abs(felt / DEVICE.full_scale - PROFILE).max() < 1e-3
 
@@ -151,8 +152,8 @@ def test_the_accuracy_needed_is_enough_and_hardly_more_is_not() -> None:
     assert found.row.report.yield_ >= 0.9
     fresh = replace(TRIAL, tolerance=0.1, seed=777)
     for factor, enough in ((0.9, True), (1.15, False)):
-        search = Search(DEVICE, fresh, found.spread.scaled(factor))
-        rows = [search.row(held) for held in (nominal, found.row.held, search.least(nominal, free_omega=False))]
+        search = RobustSearch(DEVICE, fresh, found.spread.scaled(factor))
+        rows = [search.row(held) for held in (nominal, found.row.point, search.least(nominal, free_omega=False))]
         assert (max(row.report.yield_ for row in rows) >= 0.9) is enough
 
 
@@ -164,14 +165,14 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
         lam = device.delta * math.sqrt(omega2) / math.sin(lag)
         omega2 = 1 + 0.75 * device.beta * a**2 + lam * (1 - math.cos(lag))
     epsilon = a * math.hypot(1 - omega2 + 0.75 * device.beta * a**2, device.delta * math.sqrt(omega2))
-    nominal = Held(epsilon, np.full(5, lam), math.sqrt(omega2))
-    wish = Wish(np.exp(-1j * lag * np.arange(6))[None], a, phase_matters=True)
-    trial = Trial(device.chain, wish, Spread(f0=0.01), tolerance=0.2, threshold=0.5, count=400, seed=0)
+    nominal = OperatingPoint(epsilon, np.full(5, lam), math.sqrt(omega2))
+    wish = FrameTarget(np.exp(-1j * lag * np.arange(6))[None], a, phase_matters=True)
+    trial = Trial(device.chain, wish, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5, count=400, seed=0)
     plan = robust_plan(device, trial, nominal, well_share=WELL)
     assert plan.nominal.nominal_error < 1e-9
     assert plan.trade == ()
     assert plan.robust.report.yield_ < 0.05
-    assert len(set(plan.robust.held.lam)) == 1
+    assert len(set(plan.robust.point.lam)) == 1
     needed = accuracy_needed(device, trial, nominal, share=0.9)
     assert 1e-4 < needed.spread.f0 < 1e-3
     assert needed.row.report.yield_ >= 0.9
@@ -179,8 +180,10 @@ def test_a_wave_over_weak_coupling_needs_a_hundredth_of_a_percent() -> None:
 
 def test_no_accuracy_helps_a_setting_that_cannot_make_the_pattern() -> None:
     device = load_device("paper-6x6")
-    trial = Trial(device.chain, Wish(PROFILE[None] + 0j, 0.02), Spread(f0=0.01), 0.05, 0.5, count=50, seed=0)
-    found = accuracy_needed(device, trial, Held(1e-4, np.full(5, 6e-3), 1.0), share=0.9)
+    trial = Trial(
+        device.chain, FrameTarget(PROFILE[None] + 0j, 0.02), RelativeSpread(f0=0.01), 0.05, 0.5, count=50, seed=0
+    )
+    found = accuracy_needed(device, trial, OperatingPoint(1e-4, np.full(5, 6e-3), 1.0), share=0.9)
     assert found.factor == 0.0
     assert found.row.report.yield_ < 0.9
     easy = accuracy_needed(DEVICE, replace(TRIAL, tolerance=5.0, threshold=0.0), closed_form(1.35), share=0.9)
@@ -189,7 +192,7 @@ def test_no_accuracy_helps_a_setting_that_cannot_make_the_pattern() -> None:
 
 def test_a_planned_state_is_judged_as_it_stands() -> None:
     state = Vibration(DEVICE, 20.0).states(PROFILE[None])[0]
-    row = Search(DEVICE, TRIAL, TRIAL.spread).row(hold(state))
+    row = RobustSearch(DEVICE, TRIAL, TRIAL.spread).row(state)
     assert row.nominal_error < 1e-4
     frame = spread_of(DEVICE, [state], TRIAL.spread, tolerance=0.2, threshold=0.5, seed=TRIAL.seed + 1)
     np.testing.assert_allclose(row.report.error, frame.error, rtol=1e-12)

@@ -15,10 +15,10 @@ from planner.amplitudes.deflection import Deflection
 from planner.amplitudes.vibration import Vibration
 from planner.closed_forms.links import drive_for, links_for
 from planner.errors import PlanError
-from planner.plan import ChainState, Tone
-from planner.robustness.batch_march import Parts, march
+from planner.operating_point import OperatingPoint, PointTone
+from planner.robustness.batch_march import BatchParts, march
 from planner.robustness.ring_march import march_ring
-from planner.robustness.spread import Spread, SpreadError, Wish, draw, judge, motion_of, spread_of
+from planner.robustness.spread import FrameTarget, RelativeSpread, SpreadError, draw, judge, motion_of, spread_of
 from planner.robustness.tone_march import march_tones
 from planner.waves.two_tones import MAIN, two_tones
 
@@ -48,7 +48,7 @@ def test_drawn_chains_agree_with_harmonic_balance(full_scale: float) -> None:
         links_for(CHAIN, full_scale * PROFILE, omega),
         float(drive_for(CHAIN, full_scale * PROFILE[:1], omega)[0]),
     )
-    parts = draw(6, count=count, seed=3).parts(CHAIN, Spread(f0=0.01, delta=0.1, beta=0.2, lam=0.05))
+    parts = draw(6, count=count, seed=3).parts(CHAIN, RelativeSpread(f0=0.01, delta=0.1, beta=0.2, lam=0.05))
     motion = march(parts, first(epsilon)[:, None], links(lam)[:, None], omega)
     for j in range(count):
         one = Chain.of(6, delta=parts.delta[:, 0, j], beta=parts.beta[:, 0, j], stiffness=parts.stiffness[:, 0, j])
@@ -75,7 +75,7 @@ def test_one_oscillator_has_the_roots_of_its_cubic(
     k: float, delta: float, sign: float, beta: float, push: float, high: bool
 ) -> None:
     expected = roots_of(k, delta, 0.75 * sign * beta, push)
-    parts = Parts(np.array([[1 + k]]), np.array([[delta]]), np.array([[sign * beta]]), np.ones((1, 1)))
+    parts = BatchParts(np.array([[1 + k]]), np.array([[delta]]), np.array([[sign * beta]]), np.ones((1, 1)))
     wanted = expected[-1] if high else expected[0]
     near = push / (k + 0.75 * sign * beta * wanted + 1j * delta) if high else None
     motion = march(
@@ -96,7 +96,7 @@ def test_one_oscillator_has_the_roots_of_its_cubic(
 
 
 def test_a_static_deflection_solves_its_cubic() -> None:
-    parts = draw(4, count=5, seed=1).parts(Chain(4, 0.01, -1.0), Spread(f0=0.02, beta=0.3, lam=0.1))
+    parts = draw(4, count=5, seed=1).parts(Chain(4, 0.01, -1.0), RelativeSpread(f0=0.02, beta=0.3, lam=0.1))
     bias, lam = np.array([0.2, -0.1, 0.05, 0.3]), np.array([0.0, 0.02, 0.05, 0.01])
     z = march(parts, (bias + 0j)[:, None, None], lam[:, None, None], 0.0).phasor
     assert np.all(z.imag == 0)
@@ -110,7 +110,7 @@ def test_a_static_deflection_solves_its_cubic() -> None:
 
 def test_tangents_are_finite_differences() -> None:
     rng = np.random.default_rng(0)
-    parts = draw(6, count=3, seed=5).parts(CHAIN, Spread(f0=0.01))
+    parts = draw(6, count=3, seed=5).parts(CHAIN, RelativeSpread(f0=0.01))
     lam, omega = np.full(6, 0.3) * (np.arange(6) > 0), 1.3
     force = np.zeros((6, 1, 1), dtype=np.complex128)
     force[0] = 0.03
@@ -131,8 +131,8 @@ def test_quantiles_of_one_linear_actuator_are_those_of_the_normal_distribution()
     # Above resonance the amplitude falls as the natural frequency falls, so the draws that are made are an interval.
     chain, omega, sigma, epsilon = Chain(1, 5e-3, 0.0), 1.2, 0.01, 0.1
     nominal = epsilon / abs(1 - omega**2 + 1j * chain.delta * omega)
-    wish = Wish(np.array([[1.0 + 0j]]), nominal)
-    parts = draw(1, count=200_000, seed=0).parts(chain, Spread(f0=sigma))
+    wish = FrameTarget(np.array([[1.0 + 0j]]), nominal)
+    parts = draw(1, count=200_000, seed=0).parts(chain, RelativeSpread(f0=sigma))
     report = judge(
         wish, march(parts, np.full((1, 1, 1), epsilon + 0j), np.zeros((1, 1, 1)), omega), tolerance=0.05, threshold=0.5
     )
@@ -148,17 +148,17 @@ def test_quantiles_of_one_linear_actuator_are_those_of_the_normal_distribution()
     assert report.quantile(1.0) == report.error.max()
 
 
-def states(targets: Floats) -> list[ChainState]:
+def states(targets: Floats) -> list[OperatingPoint]:
     return Vibration(DEVICE, 20.0).states(np.maximum(targets, 0.1))
 
 
 def test_a_frame_without_spread_is_at_its_target_and_with_spread_is_not() -> None:
     frame = states(np.random.default_rng(2).integers(0, 2, (6, 6)).astype(float))
-    exact = spread_of(DEVICE, frame, Spread(), tolerance=0.01, threshold=0.5, count=3)
+    exact = spread_of(DEVICE, frame, RelativeSpread(), tolerance=0.01, threshold=0.5, count=3)
     assert exact.error.max() < 1e-4
     assert exact.yield_ == 1.0
     errors = [
-        spread_of(DEVICE, frame, Spread(f0=s), tolerance=0.05, threshold=0.5, count=300).median
+        spread_of(DEVICE, frame, RelativeSpread(f0=s), tolerance=0.05, threshold=0.5, count=300).median
         for s in (1e-4, 1e-3, 1e-2)
     ]
     # To first order the error grows with the spread.
@@ -169,9 +169,9 @@ def test_a_frame_without_spread_is_at_its_target_and_with_spread_is_not() -> Non
 def test_a_frame_held_by_biases_hardly_feels_the_spread() -> None:
     device = load_device("paper-6x6")
     frame = Deflection(device).states(np.random.default_rng(2).integers(0, 2, (6, 6)).astype(float))
-    assert spread_of(device, frame, Spread(), tolerance=0.01, threshold=0.5, count=1).error.max() < 1e-6
+    assert spread_of(device, frame, RelativeSpread(), tolerance=0.01, threshold=0.5, count=1).error.max() < 1e-6
     # z = b/k to first order, and k is the square of the natural frequency.
-    small = spread_of(device, frame, Spread(f0=0.01), tolerance=0.2, threshold=0.5)
+    small = spread_of(device, frame, RelativeSpread(f0=0.01), tolerance=0.2, threshold=0.5)
     assert small.yield_ == 1.0
     assert 0.01 < small.median < 0.1
 
@@ -179,20 +179,21 @@ def test_a_frame_held_by_biases_hardly_feels_the_spread() -> None:
 def test_the_same_seed_gives_the_same_draws_and_more_spread_the_same_directions() -> None:
     frame = states(np.eye(6))
     again = [
-        spread_of(DEVICE, frame, Spread(f0=0.003, lam=0.01), tolerance=0.1, threshold=0.5, seed=9).error for _ in "ab"
+        spread_of(DEVICE, frame, RelativeSpread(f0=0.003, lam=0.01), tolerance=0.1, threshold=0.5, seed=9).error
+        for _ in "ab"
     ]
     np.testing.assert_array_equal(again[0], again[1])
-    other = spread_of(DEVICE, frame, Spread(f0=0.003, lam=0.01), tolerance=0.1, threshold=0.5, seed=8).error
+    other = spread_of(DEVICE, frame, RelativeSpread(f0=0.003, lam=0.01), tolerance=0.1, threshold=0.5, seed=8).error
     assert not np.array_equal(again[0], other)
 
 
 def test_draws_have_the_deviations_asked_for() -> None:
-    parts = draw(6, count=4000, seed=0, chains=6).parts(CHAIN, Spread(f0=0.01, delta=0.05, beta=0.1, lam=0.02))
+    parts = draw(6, count=4000, seed=0, chains=6).parts(CHAIN, RelativeSpread(f0=0.01, delta=0.05, beta=0.1, lam=0.02))
     assert np.sqrt(parts.stiffness).std() == pytest.approx(0.01, rel=0.02)
     assert parts.delta.std() / CHAIN.delta == pytest.approx(0.05, rel=0.02)
     assert parts.beta.mean() == pytest.approx(-1, abs=0.002)
     assert parts.lam_gain.std() == pytest.approx(0.02, rel=0.02)
-    wild = draw(6, count=1000, seed=0).parts(CHAIN, Spread(f0=3.0, delta=3.0, lam=3.0))
+    wild = draw(6, count=1000, seed=0).parts(CHAIN, RelativeSpread(f0=3.0, delta=3.0, lam=3.0))
     assert min(wild.stiffness.min(), wild.delta.min(), wild.lam_gain.min()) > 0
 
 
@@ -202,7 +203,7 @@ def test_a_common_phase_changes_no_error(turn: float, phase_matters: bool) -> No
     rng = np.random.default_rng(1)
     wanted = np.exp(1j * rng.uniform(0, 6, (2, 6))) * rng.uniform(0.1, 1, (2, 6))
     phasor = wanted.T[:, :, None] * rng.normal(1, 0.1, (6, 2, 5)) * 0.05
-    wish = Wish(wanted, 0.05, phase_matters=phase_matters)
+    wish = FrameTarget(wanted, 0.05, phase_matters=phase_matters)
     np.testing.assert_allclose(
         np.abs(wish.deviation(phasor)), np.abs(wish.deviation(phasor * np.exp(1j * turn))), atol=1e-12
     )
@@ -212,12 +213,12 @@ def test_a_frame_shares_its_phase_over_chains_of_one_group() -> None:
     wanted = np.exp(1j * np.array([[0.0, 0.3], [1.0, 1.3]]))
     off = np.array([1.0, np.exp(0.2j)])[None, :, None]
     phasor = wanted.T[:, :, None] * off
-    together = Wish(wanted, 1.0, phase_matters=True).deviation(phasor)
+    together = FrameTarget(wanted, 1.0, phase_matters=True).deviation(phasor)
     # One turn by 0.1 radians leaves each chain 0.1 radians off.
     np.testing.assert_allclose(together, 2 * np.sin(0.05), rtol=1e-12)
-    apart = Wish(wanted, 1.0, phase_matters=True, group=np.array([0, 1])).deviation(phasor)
+    apart = FrameTarget(wanted, 1.0, phase_matters=True, group=np.array([0, 1])).deviation(phasor)
     assert np.abs(apart).max() < 1e-12
-    some = Wish(wanted, 1.0, phase_matters=np.array([[True, True], [False, False]])).deviation(phasor)
+    some = FrameTarget(wanted, 1.0, phase_matters=np.array([[True, True], [False, False]])).deviation(phasor)
     assert np.abs(some).max() < 1e-12
 
 
@@ -225,21 +226,21 @@ def test_planned_phases_and_tones_are_known() -> None:
     state = states(np.eye(6))[0]
     phases = np.angle(state.phasor)
     frame = [replace(state, phase=phases), replace(state, phase=np.where(np.arange(6) < 3, phases + 0.4, np.nan))]
-    report = spread_of(DEVICE, frame, Spread(), tolerance=0.1, threshold=0.5, count=1)
+    report = spread_of(DEVICE, frame, RelativeSpread(), tolerance=0.1, threshold=0.5, count=1)
     assert 0.2 < report.error.max() < 0.4
-    alone = spread_of(DEVICE, frame[1:], Spread(), tolerance=0.1, threshold=0.5, count=1)
+    alone = spread_of(DEVICE, frame[1:], RelativeSpread(), tolerance=0.1, threshold=0.5, count=1)
     assert alone.error.max() < 1e-4
-    tone = Tone(1.1, 1e-3 + 0j, state.phasor)
+    tone = PointTone(1.1, 1e-3 + 0j, state.phasor)
     with pytest.raises(SpreadError, match="expected states of one tone, got more"):
-        spread_of(DEVICE, [replace(state, tones=(tone,))], Spread(), tolerance=0.1, threshold=0.5)
+        spread_of(DEVICE, [replace(state, tones=(tone,))], RelativeSpread(), tolerance=0.1, threshold=0.5)
 
 
 def test_phase_matters_only_when_it_does_and_weights_forgive() -> None:
     wanted = np.ones((1, 3), dtype=np.complex128)
     phasor = np.array([1.0, 1j, -1.0]).reshape(3, 1, 1)
-    assert np.abs(Wish(wanted, 1.0).deviation(phasor)).max() == 0
-    assert np.abs(Wish(wanted, 1.0, phase_matters=True).deviation(phasor)).max() > 1
-    wish = Wish(wanted, 1.0, weight=np.array([[1.0, 0.0, 1.0]]))
+    assert np.abs(FrameTarget(wanted, 1.0).deviation(phasor)).max() == 0
+    assert np.abs(FrameTarget(wanted, 1.0, phase_matters=True).deviation(phasor)).max() > 1
+    wish = FrameTarget(wanted, 1.0, weight=np.array([[1.0, 0.0, 1.0]]))
     off = wish.deviation(np.array([1.0, 5.0, 1.0]).reshape(3, 1, 1) + 0j)
     assert np.abs(off).max() == 0
 
@@ -252,7 +253,7 @@ def test_slopes_are_finite_differences(phase_matters: bool | NDArray[np.bool_], 
     def noise(*shape: int) -> Complexes:
         return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
 
-    wish = Wish(noise(2, 6), 0.5, phase_matters=phase_matters, weight=rng.uniform(0, 1, (2, 6)), group=group)
+    wish = FrameTarget(noise(2, 6), 0.5, phase_matters=phase_matters, weight=rng.uniform(0, 1, (2, 6)), group=group)
     phasor, change, h = noise(6, 2, 4), noise(6, 3, 2, 4), 1e-6
     slopes = wish.slope(phasor, change)
     for d in range(3):
@@ -262,25 +263,25 @@ def test_slopes_are_finite_differences(phase_matters: bool | NDArray[np.bool_], 
 
 def test_an_actuator_beyond_its_hilltop_is_not_made() -> None:
     chain = Chain(1, 5e-3, -1.0)
-    parts = draw(1, count=1, seed=0).parts(chain, Spread())
+    parts = draw(1, count=1, seed=0).parts(chain, RelativeSpread())
     motion = march(parts, np.full((1, 1, 1), 2.0 + 0j), np.zeros((1, 1, 1)), 1.05)
     assert motion.escaped.all()
-    report = judge(Wish(np.ones((1, 1)) + 0j, abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5)
+    report = judge(FrameTarget(np.ones((1, 1)) + 0j, abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5)
     assert report.error.max() < 1e-12
     assert report.yield_ == 0.0
 
 
 def test_bad_input_names_the_value() -> None:
     with pytest.raises(SpreadError, match=r"spread.delta: expected a relative standard deviation >= 0, got -0.1"):
-        Spread(delta=-0.1)
+        RelativeSpread(delta=-0.1)
     with pytest.raises(SpreadError, match="got nan"):
-        Spread(f0=float("nan"))
+        RelativeSpread(f0=float("nan"))
     for chain in (Chain(6, 5e-3, -1.0, Closure.BIDIRECTIONAL), Chain(6, 5e-3, -1.0, rows=2)):
         with pytest.raises(PlanError, match="expected an open chain or a ring, got"):
-            draw(6, count=1, seed=0).parts(chain, Spread())
+            draw(6, count=1, seed=0).parts(chain, RelativeSpread())
     driven, biased = states(np.eye(6))[0], Deflection(load_device("paper-6x6")).states(np.eye(6))[0]
     with pytest.raises(SpreadError, match="both in one frame"):
-        motion_of([driven, biased], draw(6, count=1, seed=0, chains=2).parts(CHAIN, Spread()))
+        motion_of([driven, biased], draw(6, count=1, seed=0, chains=2).parts(CHAIN, RelativeSpread()))
 
 
 RING = load_device("paper-6x6-ring")
@@ -295,7 +296,7 @@ def test_drawn_rings_agree_with_harmonic_balance() -> None:
     assert near.outcome[0] is Outcome.OK
     parts, centre = (
         draw(6, count=k, seed=1).parts(chain, s)
-        for k, s in ((count, Spread(f0=3e-4, delta=0.02, lam=0.02)), (1, Spread()))
+        for k, s in ((count, RelativeSpread(f0=3e-4, delta=0.02, lam=0.02)), (1, RelativeSpread()))
     )
     motion = march_ring(
         parts, centre, first(2e-4)[:, None], lam[:, None, None], np.full((1, 1), omega), near.phasor.T[:, :, None]
@@ -317,7 +318,7 @@ def test_rings_whose_branch_ends_are_not_felt() -> None:
     setting = Setting.of(chain, epsilon=2e-3, lam=[lam], omega=omega)
     near = solve(chain, setting, tol=1e-10, rung="harmonic_balance", start="rest").phasor.T[:, :, None]
     assert np.isfinite(near).all()
-    parts, centre = (draw(6, count=k, seed=0).parts(chain, Spread(f0=s)) for k, s in ((300, 0.01), (1, 0.0)))
+    parts, centre = (draw(6, count=k, seed=0).parts(chain, RelativeSpread(f0=s)) for k, s in ((300, 0.01), (1, 0.0)))
     motion = march_ring(parts, centre, first(2e-3)[:, None], lam[:, None, None], np.full((1, 1), omega), near)
     lost = motion.escaped[0]
     assert 0 < np.count_nonzero(lost) < 300
@@ -329,14 +330,14 @@ def test_rings_whose_branch_ends_are_not_felt() -> None:
     assert np.abs(left[:, 0, ~lost]).max() < 1e-9
 
 
-def walking(lam: float = 0.02, amplitude: float = 0.01, n: int = 6) -> ChainState:
+def walking(lam: float = 0.02, amplitude: float = 0.01, n: int = 6) -> OperatingPoint:
     """Two tones under one lam, as a device without spread holds them."""
     chain = Chain(n, 5.3e-3, -1.0)
     found = two_tones(chain, amplitude=amplitude, width=2.0, lam=lam)
     assert found is not None
     phasors = found.phasor[:, None] * np.exp(-1j * np.outer(found.lag, np.arange(n)))
     tones = [
-        Tone(float(w), complex(e), z, k not in (MAIN, MAIN + 1))
+        PointTone(float(w), complex(e), z, k not in (MAIN, MAIN + 1))
         for k, (w, e, z) in enumerate(zip(found.omega, found.epsilon, phasors, strict=True))
     ]
     head, *others = sorted(tones, key=lambda tone: tone.side)
@@ -346,13 +347,13 @@ def walking(lam: float = 0.02, amplitude: float = 0.01, n: int = 6) -> ChainStat
     )  # fmt: skip
 
 
-def flat(parts: Parts) -> Parts:
-    return Parts(parts.stiffness[:, 0], parts.delta[:, 0], parts.beta[:, 0], parts.lam_gain[:, 0])
+def flat(parts: BatchParts) -> BatchParts:
+    return BatchParts(parts.stiffness[:, 0], parts.delta[:, 0], parts.beta[:, 0], parts.lam_gain[:, 0])
 
 
 def test_tones_without_spread_are_those_planned() -> None:
     state = walking()
-    motion = march_tones(state, flat(draw(6, count=1, seed=0).parts(Chain(6, 5.3e-3, -1.0), Spread())))
+    motion = march_tones(state, flat(draw(6, count=1, seed=0).parts(Chain(6, 5.3e-3, -1.0), RelativeSpread())))
     planned = [state.phasor, next(tone.phasor for tone in state.tones if not tone.side)]
     assert not motion.lost.any()
     np.testing.assert_allclose(motion.phasor[motion.wanted, :, 0], planned, rtol=1e-6)
@@ -360,7 +361,7 @@ def test_tones_without_spread_are_those_planned() -> None:
 
 def test_drawn_tones_are_those_of_the_full_equations() -> None:
     state, n = walking(n=2, amplitude=0.02), 2
-    parts = flat(draw(n, count=1, seed=2).parts(Chain(n, 5.3e-3, -1.0), Spread(f0=1e-3, delta=0.05, lam=0.05)))
+    parts = flat(draw(n, count=1, seed=2).parts(Chain(n, 5.3e-3, -1.0), RelativeSpread(f0=1e-3, delta=0.05, lam=0.05)))
     motion = march_tones(state, parts)
     every = [(state.omega, state.epsilon), *((tone.omega, tone.epsilon) for tone in state.tones)]
     dtau, last = 2 * np.pi / 64, 25_000
@@ -385,4 +386,4 @@ def test_tones_that_are_not_equally_spaced_are_refused() -> None:
     state = walking()
     odd = replace(state, tones=(replace(state.tones[0], omega=state.tones[0].omega + 1e-4), *state.tones[1:]))
     with pytest.raises(ValueError, match="expected equal spacings"):
-        march_tones(odd, flat(draw(6, count=1, seed=0).parts(Chain(6, 5e-3, -1.0), Spread())))
+        march_tones(odd, flat(draw(6, count=1, seed=0).parts(Chain(6, 5e-3, -1.0), RelativeSpread())))

@@ -12,9 +12,9 @@ import pytest
 from chainsim import Outcome, load_device
 from drivers import Waveform, WaveformError, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, walking_bars
-from planner import ChainState, ContrastError, FramePlan, Margins, Plan, Ramp, Tone, ToneRamp, plan_scene
+from planner import ContrastError, FramePlan, Margins, OperatingPoint, Plan, PointTone, Ramp, ToneRamp, plan_scene
 from planner.cache import PlanCache
-from planner.chains import MOST_STATES, Chains
+from planner.memory import MOST_STATES, Memory
 from planner.transitions.joining import as_tone, joined, rest_for, turned_ramp, turned_state
 
 SINGLE = load_device("independent-6x6")
@@ -23,16 +23,16 @@ GRID = GridShape(6, 6)
 FINE = SINGLE.model_copy(update={"amplifier": SINGLE.amplifier.model_copy(update={"rate_hz": 200_000})})
 
 
-def state(epsilon: complex = 0.01j, omega: float = 1.0, tones: tuple[Tone, ...] = ()) -> ChainState:
-    return ChainState(
+def state(epsilon: complex = 0.01j, omega: float = 1.0, tones: tuple[PointTone, ...] = ()) -> OperatingPoint:
+    return OperatingPoint(
         target=np.ones(1), epsilon=epsilon, lam=np.zeros(0), bias=np.zeros(1), omega=omega,
         phasor=np.full(1, 0.05 + 0j), mean=np.zeros(1), error=0.0, margins=Margins(0.0, 0.0), outcome=Outcome.OK,
         phase=np.array([0.5]), tones=tones,
     )  # fmt: skip
 
 
-def tone(omega: float, epsilon: complex) -> Tone:
-    return Tone(omega, epsilon, np.full(1, 0.02 + 0.01j))
+def tone(omega: float, epsilon: complex) -> PointTone:
+    return PointTone(omega, epsilon, np.full(1, 0.02 + 0.01j))
 
 
 def ramp(last: complex, *tones: ToneRamp) -> Ramp:
@@ -40,7 +40,7 @@ def ramp(last: complex, *tones: ToneRamp) -> Ramp:
     return Ramp(0.1 * x, epsilon=last * x**2, epsilon_slope=20 * last * x, tones=tones)
 
 
-def sampled(shown: ChainState, way: Ramp | None) -> np.ndarray:
+def sampled(shown: OperatingPoint, way: Ramp | None) -> np.ndarray:
     count = FINE.rows * FINE.chains_per_row
     frame = FramePlan(
         Frame(TargetPattern(np.ones((6, 6), dtype=np.complex128)), 0.3), 0.0, 0.1, 0.3, (shown,) * count, (way,) * count
@@ -80,7 +80,7 @@ def test_joined_ramps_last_as_long_as_both() -> None:
 def test_links_jump_where_ramps_meet() -> None:
     device_state = state()
     three = [
-        ChainState(**{**vars(device_state), "lam": np.full(2, value), "bias": np.zeros(3), "target": np.ones(3)})
+        OperatingPoint(**{**vars(device_state), "lam": np.full(2, value), "bias": np.zeros(3), "target": np.ones(3)})
         for value in (0.1, 0.3)
     ]
     first = Ramp(np.array([0.0, 0.5]), lam_t_s=np.array([0.0, 0.5]), lam=np.array([[0.1, 0.1], [0.0, 0.0]]))
@@ -152,20 +152,20 @@ def test_a_contrast_that_is_none_is_refused(contrast_db: float) -> None:
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planner.chains.MOST_STATES", 8)
-    monkeypatch.setattr("planner.chains.MOST_RAMPS", 8)
-    chains, rng = Chains(SINGLE, 20.0), np.random.default_rng(0)
-    held = [chains.rest] * 36
+    monkeypatch.setattr("planner.memory.MOST_STATES", 8)
+    monkeypatch.setattr("planner.memory.MOST_RAMPS", 8)
+    memory, rng = Memory(SINGLE, 20.0), np.random.default_rng(0)
+    held = [memory.rest] * 36
     for _ in range(5):
-        now = chains.hold(TargetPattern(rng.uniform(0.1, 1, (6, 6)).astype(np.complex128)), held)
+        now = memory.hold(TargetPattern(rng.uniform(0.1, 1, (6, 6)).astype(np.complex128)), held)
         for one, other in zip(held, now, strict=True):
-            chains.state(other)
-            chains.ramp(one, other, True)
+            memory.state(other)
+            memory.ramp(one, other, True)
         held = now
-        assert len(chains._turned) <= 8
-        assert len(chains._turned_ramps) <= 8
-        assert len(chains._wishes) <= 8
-        assert len(chains._states) <= 8 + 36
+        assert len(memory._states) <= 8
+        assert len(memory._turned) <= 8
+        assert len(memory._held) <= 8
+        assert len(memory._points) <= 8 + 36
     assert MOST_STATES >= 64
 
 
@@ -209,7 +209,7 @@ def test_the_file_says_which_rows_move(tmp_path: Path) -> None:
 
 def test_links_stay_through_a_rest() -> None:
     """Links that crept up while the chain rests would pass on what is left in it."""
-    still = ChainState(**{**vars(state()), "lam": np.full(2, 0.3), "bias": np.zeros(3), "target": np.ones(3)})
+    still = OperatingPoint(**{**vars(state()), "lam": np.full(2, 0.3), "bias": np.zeros(3), "target": np.ones(3)})
     down = Ramp(np.array([0.0, 0.5]), lam_t_s=np.array([0.0, 0.5]), lam=np.array([[0.3, 0.3], [0.0, 0.0]]))
     up = Ramp(np.array([0.0, 0.2]), lam_t_s=np.array([0.0, 0.2]), lam=np.array([[0.5, 0.5], [0.3, 0.3]]))
     whole = joined(rest_for(down, 1.0), up, still, still)

@@ -9,7 +9,7 @@ import pytest
 
 from chainsim import Outcome, Setting, Stats, balance_near, load_device, solve
 from encoders import Frame, GridShape, Scene, TextOptions, TextSource, encode_text, levels
-from planner import FramePlan, Tone, plan_scene
+from planner import FramePlan, PointTone, plan_scene
 from planner.analysis.climbing import climb
 from planner.analysis.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
 from planner.analysis.tradeoff import LONG_S, Tradeoff, TradeoffRow, by_clock, trade_off
@@ -225,7 +225,7 @@ def test_complaints():
     with pytest.raises(TradeoffError, match="nothing is felt"):
         trade_off(frames, device)
     moving, single = frames_of("a", "independent-6x6")
-    beating = [replace(one, tones=(Tone(1.1, 1e-3 + 0j, np.array([1e-2 + 0j])),)) for one in moving[0].states]
+    beating = [replace(one, tones=(PointTone(1.1, 1e-3 + 0j, np.array([1e-2 + 0j])),)) for one in moving[0].states]
     with pytest.raises(TradeoffError, match="several tones"):
         trade_off([FramePlan(moving[0].frame, 0.0, 0.1, 1.0, tuple(beating), (None,) * 36)], single)
     with pytest.raises(TradeoffError, match="budget: expected a number > 0, got 0"):

@@ -16,9 +16,9 @@ from planner import plan_scene
 from planner.amplitudes import vibration as vibration_module
 from planner.amplitudes.refine import refine
 from planner.cache import PlanCache
-from planner.chains import Chains
-from planner.plan import ChainState
-from planner.unequal import UnequalChains
+from planner.memory import Memory
+from planner.operating_point import OperatingPoint
+from planner.unequal import UnequalMemory
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def measured(device: Device, sigma: float, *, gain: float = 0.0, rows: tuple[int
     return device.model_copy(update={"actuators": tuple(actuators)})
 
 
-def truth(device: Device, place: int, state: ChainState) -> NDArray[np.complex128]:
+def truth(device: Device, place: int, state: OperatingPoint) -> NDArray[np.complex128]:
     """What a chain of the device does when it is set to a state, in units of full scale."""
     row, index = divmod(place, device.chains_per_row)
     chain = device.chain_at(row, index)
@@ -66,17 +66,17 @@ def truth(device: Device, place: int, state: ChainState) -> NDArray[np.complex12
     return np.asarray(answer.phasor[0] / device.full_scale)
 
 
-def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[ChainState]:
-    chains = UnequalChains(device, 20.0)
+def held(device: Device, pattern: Any, phase_matters: bool = False) -> list[OperatingPoint]:
+    memory = UnequalMemory(device, 20.0)
     target = TargetPattern(np.asarray(pattern, dtype=np.complex128), phase_matters=phase_matters)
-    return [chains.state(one) for one in chains.hold(target, chains.at_rest)]
+    return memory.states(memory.hold(target, memory.at_rest))
 
 
 @pytest.mark.parametrize("base", [LINKED, PAPER, SINGLE], ids=lambda device: device.name)
 def test_every_chain_holds_its_target_as_it_really_is(base: Device) -> None:
     device = measured(base, 0.01, gain=0.03)
-    blind = Chains(base, 20.0)
-    nominal = [blind.state(one) for one in blind.hold(TargetPattern(DOTS.astype(np.complex128)), blind.at_rest)]
+    blind = Memory(base, 20.0)
+    nominal = blind.states(blind.hold(TargetPattern(DOTS.astype(np.complex128)), blind.at_rest))
     for place, (state, other) in enumerate(zip(held(device, DOTS), nominal, strict=True)):
         assert state.outcome is Outcome.OK
         if state.target.any():

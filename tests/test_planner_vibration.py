@@ -11,9 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Device, Outcome, Span, load_device
-from planner import ChainState, Ramp
+from planner import OperatingPoint, Ramp
 from planner.amplitudes.vibration import Vibration
-from planner.families import strategy_for
+from planner.families import family_of, row_of
+from planner.targets import AmplitudeTarget
 
 LINKED = load_device("linked-6x6")
 SINGLE = load_device("independent-6x6")
@@ -22,27 +23,27 @@ Floats = NDArray[np.float64]
 
 
 def vibration(device: Device = LINKED, contrast_db: float = 20.0) -> Vibration:
-    strategy = strategy_for(device, contrast_db)
-    assert isinstance(strategy, Vibration)
-    return strategy
+    family = family_of(row_of(AmplitudeTarget, device), device, contrast_db)
+    assert isinstance(family, Vibration)
+    return family
 
 
-def standing(strategy: Vibration) -> list[ChainState]:
+def standing(family: Vibration) -> list[OperatingPoint]:
     """All 64 rows as a chain holds them that has moved before."""
-    return strategy.states(np.array([strategy.held(row, True) for row in ROWS]))
+    return family.states(np.array([family.levels(row, True) for row in ROWS]))
 
 
 @pytest.fixture(scope="module")
-def strategy() -> Vibration:
+def family() -> Vibration:
     return vibration()
 
 
 @pytest.fixture(scope="module")
-def states(strategy: Vibration) -> list[ChainState]:
-    return standing(strategy)
+def states(family: Vibration) -> list[OperatingPoint]:
+    return standing(family)
 
 
-def test_all_rows_are_held(states: list[ChainState]) -> None:
+def test_all_rows_are_held(states: list[OperatingPoint]) -> None:
     for row, state in zip(ROWS, states, strict=True):
         assert state.outcome is Outcome.OK
         assert state.error < 1e-7
@@ -55,7 +56,7 @@ def test_all_rows_are_held(states: list[ChainState]) -> None:
         assert LINKED.omega.min <= state.omega <= LINKED.omega.max
 
 
-def test_margins_are_sane(states: list[ChainState]) -> None:
+def test_margins_are_sane(states: list[OperatingPoint]) -> None:
     for state in states:
         assert state.margins.volts == pytest.approx(abs(state.epsilon) / LINKED.epsilon_max)
         assert 0 < state.margins.volts < 0.51
@@ -65,43 +66,43 @@ def test_margins_are_sane(states: list[ChainState]) -> None:
 
 @pytest.mark.parametrize("contrast_db", [10.0, 20.0, 26.0])
 def test_contrast_is_honoured_or_what_is_lacking_is_said(contrast_db: float) -> None:
-    strategy = vibration(contrast_db=contrast_db)
-    assert strategy.band.lacking == ""
-    for row, state in zip(ROWS, standing(strategy), strict=True):
-        assert state.outcome is (Outcome.UNREACHABLE if strategy.band.lacking else Outcome.OK)
+    family = vibration(contrast_db=contrast_db)
+    assert family.band.lacking == ""
+    for row, state in zip(ROWS, standing(family), strict=True):
+        assert state.outcome is (Outcome.UNREACHABLE if family.band.lacking else Outcome.OK)
         felt = np.abs(state.phasor) / LINKED.full_scale
         assert np.all(felt[row == 0] <= 10 ** (-contrast_db / 20) * (1 + 1e-6))
         # An idle floor, not silence: nothing would pass a resting actuator.
         assert np.all(felt > 0)
-    if strategy.band.lacking:
-        assert strategy.band.lacking in strategy.note()
+    if family.band.lacking:
+        assert family.band.lacking in family.note()
 
 
-def test_a_chain_rests_until_its_first_dot(strategy: Vibration) -> None:
-    np.testing.assert_array_equal(strategy.held(np.zeros(6), False), 0.0)
-    first = strategy.held(np.array([0, 1.0, 0, 0, 0, 0]), False)
+def test_a_chain_rests_until_its_first_dot(family: Vibration) -> None:
+    np.testing.assert_array_equal(family.levels(np.zeros(6), False), 0.0)
+    first = family.levels(np.array([0, 1.0, 0, 0, 0, 0]), False)
     assert np.all(first > 0)
     assert first[1] == 1
-    after = strategy.held(np.zeros(6), True)
-    assert np.all((after > 0) & (after <= strategy.band.floor))
+    after = family.levels(np.zeros(6), True)
+    assert np.all((after > 0) & (after <= family.band.floor))
 
 
-def test_rest_is_silence(strategy: Vibration) -> None:
-    (rest,) = strategy.states(np.zeros((1, 6)))
+def test_rest_is_silence(family: Vibration) -> None:
+    (rest,) = family.states(np.zeros((1, 6)))
     assert rest.outcome is Outcome.OK
     assert rest.epsilon == 0
     assert rest.error == 0
     assert not rest.phasor.any()
 
 
-def test_states_do_not_depend_on_their_company(strategy: Vibration, states: list[ChainState]) -> None:
+def test_states_do_not_depend_on_their_company(family: Vibration, states: list[OperatingPoint]) -> None:
     for index in (1, 22, 63):
-        (alone,) = strategy.states(states[index].target[None])
+        (alone,) = family.states(states[index].target[None])
         np.testing.assert_allclose(alone.lam, states[index].lam, rtol=1e-7)
         assert alone.epsilon == pytest.approx(states[index].epsilon, rel=1e-7)
 
 
-def check_ramp(ramp: Ramp, before: ChainState, after: ChainState) -> None:
+def check_ramp(ramp: Ramp, before: OperatingPoint, after: OperatingPoint) -> None:
     """A ramp within the device that begins and ends in the states; a chain at rest takes any links."""
     assert ramp.lacking == ""
     assert ramp.duration_s <= 0.35
@@ -118,28 +119,28 @@ def check_ramp(ramp: Ramp, before: ChainState, after: ChainState) -> None:
             np.testing.assert_allclose(ramp.lam[node], state.lam, rtol=1e-13)
 
 
-def test_two_hundred_changes(strategy: Vibration, states: list[ChainState]) -> None:
+def test_two_hundred_changes(family: Vibration, states: list[OperatingPoint]) -> None:
     rng = np.random.default_rng(11)
     before, after = ([states[i] for i in rng.integers(0, 64, 200)] for _ in range(2))
-    for one, other, ramp in zip(before, after, strategy.ramps(before, after), strict=True):
+    for one, other, ramp in zip(before, after, family.ramps(before, after), strict=True):
         if one is other:
             assert ramp is None
         else:
             check_ramp(ramp, one, other)
 
 
-def test_the_way_in_and_out_of_every_row(strategy: Vibration, states: list[ChainState]) -> None:
-    rest = strategy.states(np.zeros((64, 6)))
-    for state, way_in, way_out in zip(states, strategy.ramps(rest, states), strategy.ramps(states, rest), strict=True):
+def test_the_way_in_and_out_of_every_row(family: Vibration, states: list[OperatingPoint]) -> None:
+    rest = family.states(np.zeros((64, 6)))
+    for state, way_in, way_out in zip(states, family.ramps(rest, states), family.ramps(states, rest), strict=True):
         check_ramp(way_in, rest[0], state)
         check_ramp(way_out, state, rest[0])
         assert np.ptp(way_in.lam, axis=0).max() < 0.02
-    assert strategy.ramps(rest[:1], rest[:1]) == [None]
+    assert family.ramps(rest[:1], rest[:1]) == [None]
 
 
-def test_slopes_are_the_derivatives(strategy: Vibration, states: list[ChainState]) -> None:
-    (rest,) = strategy.states(np.zeros((1, 6)))
-    for ramp in strategy.ramps([states[37], rest], [states[22], states[37]]):
+def test_slopes_are_the_derivatives(family: Vibration, states: list[OperatingPoint]) -> None:
+    (rest,) = family.states(np.zeros((1, 6)))
+    for ramp in family.ramps([states[37], rest], [states[22], states[37]]):
         middle = np.arange(2, len(ramp.t_s) - 2)
         e, step = ramp.epsilon, ramp.t_s[1]
         numeric = (8 * (e[middle + 1] - e[middle - 1]) - (e[middle + 2] - e[middle - 2])) / (12 * step)
@@ -189,37 +190,37 @@ def integrated(
     ids=["mixed", "full"],
 )
 def test_a_short_story_under_the_full_equations(
-    rows: tuple[int, ...], rtol: float, strategy: Vibration, states: list[ChainState]
+    rows: tuple[int, ...], rtol: float, family: Vibration, states: list[OperatingPoint]
 ) -> None:
     """Rest, patterns, rest: patterns within 2 % of full scale from the first period on, silence below the floor.
 
     Six raised dots alike magnify noise a billion times, that of an integrator too: hence its tolerance.
     """
-    (rest,) = strategy.states(np.zeros((1, 6)))
+    (rest,) = family.states(np.zeros((1, 6)))
     told = [rest, *(states[row] for row in rows), rest]
-    felt = integrated(LINKED, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.05, rtol=rtol)
+    felt = integrated(LINKED, family.band.omega, family.ramps(told[:-1], told[1:]), stands_s=0.05, rtol=rtol)
     for state, phasors in zip(told[1:], felt, strict=True):
         off = np.abs(phasors) / LINKED.full_scale - state.target
         assert np.abs(off).max() < (0.02 if state.target.any() else 0.05)
 
 
 def test_a_single_actuator_under_the_full_equations() -> None:
-    strategy = vibration(SINGLE)
-    off, half, on = strategy.states(np.array([[0.0], [0.5], [1.0]]))
+    family = vibration(SINGLE)
+    off, half, on = family.states(np.array([[0.0], [0.5], [1.0]]))
     told = [off, on, half, off, on]
-    felt = integrated(SINGLE, strategy.band.omega, strategy.ramps(told[:-1], told[1:]), stands_s=0.1, rtol=1e-9)
+    felt = integrated(SINGLE, family.band.omega, family.ramps(told[:-1], told[1:]), stands_s=0.1, rtol=1e-9)
     for state, phasors in zip(told[1:], felt, strict=True):
         np.testing.assert_allclose(np.abs(phasors) / SINGLE.full_scale, state.target[0], atol=2e-3)
 
 
 def test_single_actuators_are_silent_or_on() -> None:
-    strategy = vibration(SINGLE)
-    off, on = strategy.states(np.array([[0.0], [1.0]]))
-    np.testing.assert_array_equal(strategy.held(np.zeros(1), True), 0.0)
+    family = vibration(SINGLE)
+    off, on = family.states(np.array([[0.0], [1.0]]))
+    np.testing.assert_array_equal(family.levels(np.zeros(1), True), 0.0)
     assert off.outcome is on.outcome is Outcome.OK
     assert off.epsilon == 0
     assert abs(on.phasor[0]) == pytest.approx(SINGLE.full_scale, rel=1e-7)
-    ramp, none = strategy.ramps([off, on], [on, on])
+    ramp, none = family.ramps([off, on], [on, on])
     assert none is None
     assert ramp.lam is None
     assert ramp.lam_t_s is None
@@ -232,8 +233,8 @@ def weak(**changes: object) -> Vibration:
 @pytest.mark.parametrize("high", [1.0, 1.1, 1.2])
 def test_patterns_out_of_reach_are_said_to_be(high: float) -> None:
     """Without detuning some profiles have no links at all; they are unreachable too, and their ways are sound."""
-    strategy = weak(omega=Span(min=0.9, max=high))
-    states = standing(strategy)
+    family = weak(omega=Span(min=0.9, max=high))
+    states = standing(family)
     assert {state.outcome for state in states} == {Outcome.UNREACHABLE}
     for state in states:
         for array in (state.lam, state.phasor, state.bias, state.mean):
@@ -241,10 +242,10 @@ def test_patterns_out_of_reach_are_said_to_be(high: float) -> None:
         assert state.error == pytest.approx(
             np.abs(np.abs(state.phasor) / LINKED.full_scale - state.target).max(), abs=1e-7
         )
-    assert "lacks detuning" in strategy.note()
-    (rest,) = strategy.states(np.zeros((1, 6)))
+    assert "lacks detuning" in family.note()
+    (rest,) = family.states(np.zeros((1, 6)))
     assert rest.outcome is Outcome.OK
-    for ramp in strategy.ramps([rest, states[63], states[1]], [states[21], states[21], rest]):
+    for ramp in family.ramps([rest, states[63], states[1]], [states[21], states[21], rest]):
         assert ramp is None or (np.all(np.isfinite(ramp.epsilon)) and np.all(np.isfinite(ramp.lam)))
 
 
@@ -254,7 +255,7 @@ def test_near_the_hilltop_no_number_is_called_right(full_scale: float) -> None:
         assert state.outcome is not Outcome.OK
 
 
-def test_a_ramp_says_what_it_lacks(strategy: Vibration, states: list[ChainState]) -> None:
+def test_a_ramp_says_what_it_lacks(family: Vibration, states: list[OperatingPoint]) -> None:
     steady = max(abs(state.epsilon) for state in states) / LINKED.epsilon_per_volt
     few_volts = weak(amplifier=LINKED.amplifier.model_copy(update={"volts": 0.5 * steady}))
     few_links = weak(coupling=LINKED.coupling.model_copy(update={"lam": Span(min=0.0, max=0.3)}))

@@ -12,21 +12,21 @@ from chainsim import Device, Outcome, load_device
 from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TextureError, walking_bars
-from planner import ChainState, Plan, plan_scene
-from planner.transitions.waves import enter_wave
+from planner import OperatingPoint, Plan, plan_scene
+from planner.targets import WalkingTarget, targets_of
+from planner.transitions.slow import watched
+from planner.transitions.waves import enter_tones
 from planner.waves.two_tones import MAIN, apart
-from planner.waves.walking import walking_rate_hz, walking_state
-from planner.wish import ChainWish, wishes_of
+from planner.waves.walking import TONES_GOOD, walking_rate_hz, walking_state
 
 PAPER, LINKED, SINGLE = (load_device(name) for name in ("paper-6x6", "linked-6x6", "independent-6x6"))
 GRID = GridShape(6, 6)
 
 
-def walk(device: Device, level: float = 0.3, **wish: float) -> ChainState:
-    (first, *_) = wishes_of(walking_bars(GRID, level=level, **wish), device)
-    assert isinstance(first.wish, ChainWish)
-    assert ChainWish.of_key(first.wish.key).key == first.wish.key
-    return walking_state(device, first.wish)
+def walk(device: Device, level: float = 0.3, **wish: float) -> OperatingPoint:
+    (first, *_) = targets_of(walking_bars(GRID, level=level, **wish), device)
+    assert isinstance(first, WalkingTarget)
+    return walking_state(device, first)
 
 
 @pytest.mark.parametrize("rate_hz", [0.4, 1.0, 3.0])
@@ -95,7 +95,7 @@ def test_the_file_walks_at_both(tmp_path: Path) -> None:
 def test_strong_links_bring_a_walk_sooner_to_stand(tmp_path: Path) -> None:
     """Than a drive that rises and is waited for; shown in the file at the place of the beat that falls to it."""
     state = walk(PAPER, level=0.1, width=2.0)
-    quick, slow = (enter_wave(PAPER, state, moves) for moves in (True, False))
+    quick, slow = (enter_tones(PAPER, state, moves, TONES_GOOD) for moves in (True, False))
     assert quick.lacking == ""
     assert quick.duration_s < 0.7 * slow.duration_s
     assert quick.lam is not None
@@ -105,6 +105,19 @@ def test_strong_links_bring_a_walk_sooner_to_stand(tmp_path: Path) -> None:
     write_waveform(plan_scene(scene, PAPER), tmp_path / "walk.wav")
     (felt,) = verify(tmp_path / "walk.wav").frames
     assert felt.amplitude_error <= 1e-2
+
+
+@pytest.mark.parametrize("device", [PAPER, LINKED], ids=lambda device: device.name)
+def test_a_walk_stands_at_every_place_of_the_beat_when_its_ramp_ends(device: Device) -> None:
+    """Under the drive that is played, whose nodes no straight lines join."""
+    state = walk(device, level=1.0 if device is LINKED else 0.1, width=3.0)
+    ramp = enter_tones(device, state, True, TONES_GOOD)
+    assert ramp.lam is not None
+    whole = ramp.duration_s * device.tau_per_s * state.omega / (2 * math.pi)
+    (other,) = [tone for tone in state.tones if not tone.side]
+    for beat in (0.0, 0.25, 0.5, 0.75):
+        start = beat * 2 * math.pi / abs(other.omega - state.omega)
+        assert watched(device, state, ramp, math.ceil(whole) + 200, start).restless(TONES_GOOD) <= whole
 
 
 @pytest.mark.parametrize("wish", [{}, {"rate_hz": 0.0}, {"rate_hz": math.inf}, {"width": 2.0, "rate_hz": -1.0}])

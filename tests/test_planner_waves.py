@@ -10,14 +10,15 @@ from hypothesis import given, strategies as st
 
 from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setting, Span, load_device, solve
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
-from planner import ChainState
-from planner.closed_forms.wave_fit import Freedom, Hold, Wanted, fit, response_to
+from planner import OperatingPoint
+from planner.closed_forms.wave_fit import Freedom, MotionTarget, fit, response_to
 from planner.margins import converter_error
+from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.two_tones import MAIN, ORDERS, two_tones
+from planner.waves.wave_fit import GOOD
 from planner.waves.wave_forms import lag_and_ratio, wave_for, wave_on
 from planner.waves.wave_state import wave_state
-from planner.wish import ChainWish, wishes_of
 
 PAPER, LINKED, COMMON, SINGLE = (
     load_device(name) for name in ("paper-6x6", "linked-6x6", "paper-6x6-common", "independent-6x6")
@@ -26,10 +27,10 @@ CHAIN = PAPER.chain
 GRID = GridShape(6, 6)
 
 
-def wave(device: Device, lag_deg: float, level: float = 0.3) -> ChainState:
-    (first, *_) = wishes_of(plane_wave(GRID, lag_deg=lag_deg, level=level), device)
-    assert isinstance(first.wish, ChainWish)
-    return wave_state(device, first.wish)
+def wave(device: Device, lag_deg: float, level: float = 0.3) -> OperatingPoint:
+    (first, *_) = targets_of(plane_wave(GRID, lag_deg=lag_deg, level=level), device)
+    assert isinstance(first, WaveTarget)
+    return wave_state(device, first)
 
 
 @given(st.floats(5, 175), st.floats(0.3, 1.2), st.floats(0.001, 0.02))
@@ -53,7 +54,7 @@ def test_the_closed_form_of_a_ring_too(closure: Closure) -> None:
     chain = Chain(n=6, delta=CHAIN.delta, beta=-1.0, closure=closure)
     made = wave_for(chain, amplitude=0.02, lag=math.radians(80))
     wanted = 0.02 * np.exp(-1j * math.radians(80) * np.arange(6))
-    held = response_to(chain, Hold(made.epsilon, np.full(5, made.lam), made.omega), wanted)
+    held = response_to(chain, made, wanted)
     np.testing.assert_allclose(held.phasor[0], wanted, atol=1e-5 * 0.02)
 
 
@@ -69,16 +70,16 @@ def test_refinement_finds_settings_that_were_hidden() -> None:
     """From a wave of another lag and amplitude back to that of known settings, whatever the start."""
     hidden = wave_for(CHAIN, amplitude=0.05, lag=math.radians(100))
     shape = 0.05 * np.exp(-1j * math.radians(100) * np.arange(6))
-    target = response_to(CHAIN, Hold(hidden.epsilon, np.full(5, hidden.lam), hidden.omega), shape).phasor[0]
+    target = response_to(CHAIN, hidden, shape).phasor[0]
     start = wave_for(CHAIN, amplitude=0.045, lag=math.radians(95))
     found = fit(
-        CHAIN, Wanted(target, np.ones(6, dtype=np.bool_), np.ones(6)),
-        Hold(start.epsilon, np.full(5, start.lam), start.omega), Freedom(1, 0.0, 0.05, 0.9, 1.1),
+        CHAIN, MotionTarget(target, np.ones(6, dtype=np.bool_), np.ones(6)),
+        start, Freedom(1, 0.0, 0.05, 0.9, 1.1),
     )  # fmt: skip
     assert found.error < 1e-8
-    assert found.hold.omega == pytest.approx(hidden.omega, rel=1e-6)
-    assert found.hold.lam[0] == pytest.approx(hidden.lam, rel=1e-5)
-    assert found.hold.epsilon == pytest.approx(hidden.epsilon, rel=1e-5)
+    assert found.point.omega == pytest.approx(hidden.omega, rel=1e-6)
+    assert found.point.lam[0] == pytest.approx(hidden.lam[0], rel=1e-5)
+    assert found.point.epsilon == pytest.approx(hidden.epsilon, rel=1e-5)
 
 
 @pytest.mark.parametrize("lag_deg", [15, 60, 90, 120, 165])
@@ -122,9 +123,9 @@ def test_the_converter_error_is_that_of_shaped_noise() -> None:
     rate = amplifier.rate_hz / device.tau_per_s
     density = step**2 / 12 / (math.pi * rate) * (2 * math.sin(1 / rate / 2)) ** 4
     expected = math.sqrt(density * math.pi / (2 * device.delta))
-    found = converter_error(device, Hold(0.01 + 0j, np.zeros(0), 1.0))
+    found = converter_error(device, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0))
     assert found == pytest.approx(expected, rel=0.05)
-    assert converter_error(SINGLE, Hold(0.01 + 0j, np.zeros(0), 1.0)) == 0
+    assert converter_error(SINGLE, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0)) == 0
 
 
 def narrowed(**changes: object) -> Device:
@@ -166,16 +167,16 @@ def test_a_fixed_lam_has_its_own_waves() -> None:
     device = narrowed(coupling=Coupling(scope="fixed", lam=Span(min=7e-3, max=7e-3)))
     made = wave_on(device.chain, amplitude=0.3 * device.full_scale, lam=7e-3, long=True)
     assert made is not None
-    stiff = 1 - made.omega**2 + 0.75 * device.beta * (0.3 * device.full_scale) ** 2 + made.lam
+    stiff = 1 - made.omega**2 + 0.75 * device.beta * (0.3 * device.full_scale) ** 2 + made.lam[0]
     lag = math.degrees(math.atan2(device.delta * made.omega, stiff))
     assert wave(device, lag).outcome is Outcome.OK
 
 
 def test_links_stop_a_wave_half_way() -> None:
     part = regions(GRID, [Region(0, 6, 0, 4, plane_wave(GRID, lag_deg=60))])
-    (first, *_) = wishes_of(part, LINKED)
-    assert isinstance(first.wish, ChainWish)
-    state = wave_state(LINKED, first.wish)
+    (first, *_) = targets_of(part, LINKED)
+    assert isinstance(first, WaveTarget)
+    state = wave_state(LINKED, first)
     assert state.outcome is Outcome.OK
     np.testing.assert_allclose(np.abs(state.phasor) / LINKED.full_scale, [1, 1, 1, 1, 0, 0], atol=1e-3)
 
@@ -187,9 +188,9 @@ def test_no_formula_a_search_and_the_same_answer_twice() -> None:
     phasor = solve(LINKED.chain, setting, tol=1e-9, rung="harmonic_balance", start="rest").phasor[0]
     turned = phasor / LINKED.full_scale * np.exp(-1j * np.angle(phasor[0]))
     target = TargetPattern(np.tile(turned, (6, 1)), PatternKind.SINE, phase_matters=True)
-    (first, *_) = wishes_of(target, LINKED)
-    assert isinstance(first.wish, ChainWish)
-    state, again = wave_state(LINKED, first.wish), wave_state(LINKED, first.wish)
+    (first, *_) = targets_of(target, LINKED)
+    assert isinstance(first, WaveTarget)
+    state, again = wave_state(LINKED, first), wave_state(LINKED, first)
     assert state.outcome is Outcome.OK
     np.testing.assert_allclose(state.phasor / LINKED.full_scale, turned, atol=1e-3 * np.abs(turned).max())
     assert again.epsilon == state.epsilon
@@ -197,13 +198,12 @@ def test_no_formula_a_search_and_the_same_answer_twice() -> None:
 
 
 @given(st.integers(-180, 180), st.integers(-180, 180), st.floats(0.1, 1))
-def test_rows_of_a_wave_are_one_wish_but_for_a_turn(lag: float, row_lag: float, level: float) -> None:
-    wishes = list(wishes_of(plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level), PAPER))
-    keys = {one.wish.key for one in wishes if isinstance(one.wish, ChainWish)}
-    assert len(keys) == 1
-    back = ChainWish.of_key(keys.pop())
-    assert back is not None
-    whole = np.array([back.amplitude * np.exp(1j * (back.phase + one.turn)) for one in wishes])
+def test_rows_of_a_wave_are_one_target_but_for_a_turn(lag: float, row_lag: float, level: float) -> None:
+    targets = list(targets_of(plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level), PAPER))
+    shared = {one.unturned for one in targets if isinstance(one, WaveTarget)}
+    assert len(shared) == len({one.key for one in shared}) == 1
+    (wave,) = shared
+    whole = np.array([wave.levels * np.exp(1j * (wave.phases + one.turn)) for one in targets])
     np.testing.assert_allclose(
         whole, plane_wave(GRID, lag_deg=lag, row_lag_deg=row_lag, level=level).amplitude, atol=1e-7
     )
@@ -211,11 +211,11 @@ def test_rows_of_a_wave_are_one_wish_but_for_a_turn(lag: float, row_lag: float, 
 
 def test_amplitudes_alone_are_no_wave() -> None:
     for pattern in (bars(GRID, vertical=True, width=1, gap=1), levels(np.full((6, 6), 0.4))):
-        assert not any(isinstance(one.wish, ChainWish) for one in wishes_of(pattern, PAPER))
+        assert all(isinstance(one, AmplitudeTarget) for one in targets_of(pattern, PAPER))
     mixed = regions(GRID, [Region(0, 2, 0, 6, plane_wave(GRID, lag_deg=60)), Region(2, 6, 0, 6, levels(np.eye(6)))])
-    assert [isinstance(one.wish, ChainWish) for one in wishes_of(mixed, PAPER)] == [True] * 2 + [False] * 4
-    waves = list(wishes_of(plane_wave(GRID, lag_deg=-70), SINGLE))
-    assert not any(isinstance(one.wish, ChainWish) for one in waves)
+    assert [isinstance(one, WaveTarget) for one in targets_of(mixed, PAPER)] == [True] * 2 + [False] * 4
+    waves = list(targets_of(plane_wave(GRID, lag_deg=-70), SINGLE))
+    assert all(isinstance(one, AmplitudeTarget) for one in waves)
     assert waves[1].turn == pytest.approx(math.radians(70))
 
 
@@ -241,7 +241,7 @@ def test_two_tones_stand_in_every_stage(amplitude: float, width: float) -> None:
 
 def test_ways_of_waves_and_tones_end_where_they_should() -> None:
     state = wave(PAPER, 90)
-    into, out = enter_wave(PAPER, state, True), leave_wave(PAPER, state, True)
+    into, out = enter_wave(PAPER, state, True, GOOD), leave_wave(PAPER, state, True)
     assert into.lacking == "" == out.lacking
     assert into.duration_s < 0.5
     assert into.epsilon is not None
@@ -257,7 +257,7 @@ def test_ways_of_waves_and_tones_end_where_they_should() -> None:
 
 def test_single_actuators_take_tones_of_any_place() -> None:
     states = []
-    for one in wishes_of(walking_bars(GRID, width=2, level=0.5), SINGLE):
-        assert isinstance(one.wish, ChainWish)
-        states.append(one.wish.place)
+    for one in targets_of(walking_bars(GRID, width=2, level=0.5), SINGLE):
+        assert isinstance(one, WalkingTarget)
+        states.append(one.place)
     assert states == [0, 1, 2, 3, 4, 5] * 6

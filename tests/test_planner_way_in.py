@@ -14,12 +14,13 @@ from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device
 from planner.amplitudes.refine import refine
+from planner.operating_point import OperatingPoint
 from planner.plan import Ramp
 from planner.transitions.fall import find_fall
 from planner.transitions.limits import WayError, WayLimits
 from planner.transitions.rise import find_way
-from planner.transitions.search import Search
-from planner.transitions.steering import LinkCourse, Standing, Steering, rest
+from planner.transitions.search import RampSearch
+from planner.transitions.steering import LinkCourse, Steering, rest
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -41,7 +42,7 @@ FINE = 300
 
 
 @cache
-def wave(lag: float, amplitude: float, n: int = 6, beta: float = -1.0) -> tuple[float, Standing]:
+def wave(lag: float, amplitude: float, n: int = 6, beta: float = -1.0) -> tuple[float, OperatingPoint]:
     """omega and the uniform wave of physics.md section 2, its phasors from harmonic balance."""
     phi, omega = math.radians(lag), 1.0
     for _ in range(100):
@@ -52,10 +53,10 @@ def wave(lag: float, amplitude: float, n: int = 6, beta: float = -1.0) -> tuple[
     setting = Setting.of(chain, epsilon=abs(epsilon), phase=np.angle(epsilon), lam=lam, omega=omega)
     answer = balance_near(chain, setting, amplitude * np.exp(-1j * phi * np.arange(n))[None, :], tol=1e-10)
     assert answer.outcome[0] in (Outcome.OK, Outcome.UNSTABLE)
-    return omega, Standing(complex(epsilon), np.full(n - 1, lam), answer.phasor[0])
+    return omega, OperatingPoint(complex(epsilon), np.full(n - 1, lam), omega, answer.phasor[0])
 
 
-def way(chain: Chain, omega: float, held: Standing, limits: WayLimits = LIMITS, budget: int = BUDGET) -> Ramp:
+def way(chain: Chain, omega: float, held: OperatingPoint, limits: WayLimits = LIMITS, budget: int = BUDGET) -> Ramp:
     return find_way(
         chain, epsilon=held.epsilon, lam=held.lam, omega=omega, phasor=held.phasor, limits=limits,
         tau_per_s=TAU_PER_S, budget=budget,
@@ -67,7 +68,7 @@ def paper_way(lag: float, amplitude: float) -> Ramp:
     return way(PAPER.chain, *wave(lag, amplitude))
 
 
-def controls(ramps: list[tuple[float, Ramp]], held: Standing, tau: Floats) -> tuple[Complexes, Floats]:
+def controls(ramps: list[tuple[float, Ramp]], held: OperatingPoint, tau: Floats) -> tuple[Complexes, Floats]:
     """Drive envelope and links at `tau` of ramps that begin at given seconds, each holding its end."""
     epsilon, lam = np.zeros(len(tau), dtype=np.complex128), np.repeat(held.lam[None, :], len(tau), axis=0)
     for start_s, ramp in ramps:
@@ -83,7 +84,12 @@ def controls(ramps: list[tuple[float, Ramp]], held: Standing, tau: Floats) -> tu
 
 
 def integrated(
-    chain: Chain, omega: float, ramps: list[tuple[float, Ramp]], held: Standing, until_s: float, phase: float = 0.0
+    chain: Chain,
+    omega: float,
+    ramps: list[tuple[float, Ramp]],
+    held: OperatingPoint,
+    until_s: float,
+    phase: float = 0.0,
 ) -> tuple[Floats, Complexes, Floats]:
     """Middle of each period in seconds, first harmonics in it, shape (periods, n), and the largest |z| in it."""
     dtau = 2 * np.pi / omega / FINE
@@ -216,7 +222,7 @@ def test_every_link_may_have_its_own_course() -> None:
     chain, omega = PAPER.chain, math.sqrt(1.06)
     amplitude = 0.03 * np.array([1.0, 0.6, 1.0, 0.6, 0.8, 1.0])
     found = refine(chain, amplitude[None, :], omega)
-    held = Standing(complex(found.epsilon[0]), found.lam[0], found.phasor[0])
+    held = OperatingPoint(complex(found.epsilon[0]), found.lam[0], omega, found.phasor[0])
     ramp = way(chain, omega, held, replace(LIMITS, lam_scope="link", lam_max=0.2))
     assert not ramp.lacking
     assert ramp.lam is not None
@@ -228,7 +234,7 @@ def test_every_link_may_have_its_own_course() -> None:
 
 def test_the_budget_is_kept() -> None:
     omega, held = wave(120, 0.07)
-    search = Search(PAPER.chain, rest(held.lam), held, omega, LIMITS, TAU_PER_S, 9)
+    search = RampSearch(PAPER.chain, rest(held.lam, omega), held, omega, LIMITS, TAU_PER_S, 9)
     assert search.shorter_and_shorter()
     assert search.spent <= 9
 
@@ -248,7 +254,7 @@ def test_the_scale_of_z_does_not_matter() -> None:
     """z -> z / sqrt|beta| takes one chain into the other (physics.md section 1)."""
     omega, held = wave(120, 0.07)
     strong = Chain(n=6, delta=PAPER.delta, beta=-1e4)
-    small = Standing(held.epsilon / 100, held.lam, held.phasor / 100)
+    small = OperatingPoint(held.epsilon / 100, held.lam, omega, held.phasor / 100)
     ramp, big = way(strong, omega, small), paper_way(120, 0.07)
     assert ramp.epsilon is not None
     assert big.epsilon is not None
@@ -295,7 +301,7 @@ def test_what_makes_no_sense_is_refused() -> None:
 
 def test_slopes_of_drive_and_links_belong_to_them() -> None:
     _, held = wave(120, 0.07)
-    start = Standing(0.7j * held.epsilon, 2 * held.lam, 1.3 * held.phasor, turning=0.01)
+    start = OperatingPoint(0.7j * held.epsilon, 2 * held.lam, 1.01, 1.3 * held.phasor)
     task = Steering(PAPER.chain, 1.0, start, held, LinkCourse(0.05, 0.25), 300.0)
     x, h = np.linspace(0.0, 1.0, 997), 1e-6
     unknowns = np.random.default_rng(3).normal(size=(2, task.size))

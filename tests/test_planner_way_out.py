@@ -16,13 +16,15 @@ from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, plane_wave
 from planner import Plan, Ramp, plan_scene
+from planner.drive import smooth_step
+from planner.operating_point import OperatingPoint
+from planner.targets import WaveTarget, targets_of
 from planner.transitions.check import SAMPLES_PER_PERIOD, Orbit, Way, travel
 from planner.transitions.fall import CALM, find_fall
 from planner.transitions.limits import WayLimits
 from planner.transitions.rise import orbit_of
-from planner.transitions.steering import LinkCourse, Standing, Steering, rest, smooth_step
+from planner.transitions.steering import LinkCourse, Steering, rest
 from planner.waves.wave_state import wave_state
-from planner.wish import ChainWish, wishes_of
 
 Floats = NDArray[np.float64]
 PAPER, LINKED = load_device("paper-6x6"), load_device("linked-6x6")
@@ -35,11 +37,11 @@ LIMITS = WayLimits(
 
 
 @cache
-def standing(lag_deg: float, level: float) -> tuple[float, Standing]:
-    (first, *_) = wishes_of(plane_wave(GRID, lag_deg=lag_deg, level=level), PAPER)
-    assert isinstance(first.wish, ChainWish)
-    state = wave_state(PAPER, first.wish)
-    return state.omega, Standing(state.epsilon, state.lam, state.phasor)
+def standing(lag_deg: float, level: float) -> tuple[float, OperatingPoint]:
+    (first, *_) = targets_of(plane_wave(GRID, lag_deg=lag_deg, level=level), PAPER)
+    assert isinstance(first, WaveTarget)
+    state = wave_state(PAPER, first)
+    return state.omega, state
 
 
 @cache
@@ -69,7 +71,7 @@ def test_a_stopped_wave_rests_at_any_phase_of_the_carrier(lag_deg: float, level:
     ramp = fall(lag_deg, level)
     assert ramp.lacking == ""
     assert ramp.duration_s < 3 * EFOLD_S
-    orbit, amplitude = orbit_of(PAPER.chain, held, omega)[0], float(np.abs(held.phasor).max())
+    orbit, amplitude = orbit_of(PAPER.chain, held)[0], float(np.abs(held.phasor).max())
     for phase in (0.0, 0.9, 2.3):
         passage = travel(PAPER.chain, omega, way_of(ramp), orbit, 200, (phase,))
         assert np.abs(passage.felt).max() <= 1e-3 * amplitude
@@ -138,16 +140,16 @@ def test_an_orbit_begins_at_its_own_frequency() -> None:
 
 def test_steering_from_one_motion_to_another_begins_and_ends_with_their_drives_and_links() -> None:
     _, held = standing(120, 0.5)
-    start = Standing(0.3j * held.epsilon, 2 * held.lam, 0.5 * held.phasor, turning=0.004)
+    start = OperatingPoint(0.3j * held.epsilon, 2 * held.lam, 1.004, 0.5 * held.phasor)
     task = Steering(PAPER.chain, 1.0, start, held, LinkCourse(0.05, 0.25), 300.0)
     ends = np.array([0.0, 0.5, 1.0])
     drive, _ = task.drive(ends, np.zeros((1, task.size)))
     lam, _ = task.links.at(ends, start, held)
     np.testing.assert_allclose(drive[[0, 2], 0], [start.epsilon, held.epsilon])
     np.testing.assert_allclose(lam, [start.lam, np.full(5, 0.05), held.lam])
-    lam, _ = task.links.at(ends, rest(held.lam), held)
+    lam, _ = task.links.at(ends, rest(held.lam, 1.0), held)
     np.testing.assert_allclose(lam, [np.full(5, 0.05), np.full(5, 0.05), held.lam])
-    assert smooth_step(ends)[0].tolist() == [0.0, 0.5, 1.0]
+    assert smooth_step(ends).value.tolist() == [0.0, 0.5, 1.0]
 
 
 def shown(device: Device, patterns: list[TargetPattern], dwell_s: float, folder: Path) -> list[float]:

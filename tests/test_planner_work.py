@@ -78,10 +78,10 @@ def test_a_way_does_not_depend_on_those_beside_it():
         alone = change(CHAIN, before[[i]], after[[i]], OMEGA, DURATION, 251)
         for name in ("epsilon", "epsilon_slope", "lam", "lam_slope"):
             assert np.array_equal(getattr(alone, name)[0], getattr(together, name)[i])
-    strategy = Vibration(LINKED, 20.0)
-    states = strategy.states(np.concatenate([ROWS[1:20], rows[:5]]) / LINKED.full_scale)
-    ways = strategy.ramps(states[:-1], states[1:])
-    (alone,) = strategy.ramps(states[3:4], states[4:5])
+    family = Vibration(LINKED, 20.0)
+    states = family.states(np.concatenate([ROWS[1:20], rows[:5]]) / LINKED.full_scale)
+    ways = family.ramps(states[:-1], states[1:])
+    (alone,) = family.ramps(states[3:4], states[4:5])
     assert np.array_equal(alone.epsilon, ways[3].epsilon)
     assert np.array_equal(alone.lam, ways[3].lam)
 

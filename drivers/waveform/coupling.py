@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import ChainState, FramePlan, Ramp
+from planner import FramePlan, OperatingPoint, Ramp, links_at
 
 __all__ = ["CouplingEvent", "CouplingWriter", "LamTrack"]
 
@@ -84,7 +84,7 @@ class _RowPath:
     after: Floats
 
     @classmethod
-    def of(cls, device: Device, states: Sequence[ChainState], ramps: Sequence[Ramp | None]) -> _RowPath:
+    def of(cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]) -> _RowPath:
         nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
         # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
         t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))
@@ -93,13 +93,8 @@ class _RowPath:
         n = device.chain_length
         for chain, (state, ramp) in enumerate(zip(states, ramps, strict=True)):
             links = slice(chain * n, chain * n + n - 1)
-            before[:, links] = after[:, links] = state.lam
-            if ramp is not None and ramp.lam is not None and ramp.lam_t_s is not None:
-                for link in range(n - 1):
-                    moving = np.interp(t_s, ramp.lam_t_s, ramp.lam[:, link])
-                    column, last = chain * n + link, ramp.lam_t_s[-1]
-                    before[:, column] = np.where(t_s <= last, moving, state.lam[link])
-                    after[:, column] = np.where(t_s < last, moving, state.lam[link])
+            before[:, links] = links_at(state, ramp, t_s, before=True)
+            after[:, links] = links_at(state, ramp, t_s)
         return cls(t_s, before, after)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
-from planner import ChainState, FramePlan
+from planner import FramePlan, OperatingPoint
 
 from ..channels import Channel, channels_of
 from ..errors import UnreadableWaveform, WaveformError
@@ -277,13 +277,13 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
     return mark
 
 
-def _phases(state: ChainState) -> list[float | None]:
+def _phases(state: OperatingPoint) -> list[float | None]:
     if state.phase is None:
         return [None] * len(state.target)
     return [None if np.isnan(phase) else _rounded(phase) for phase in state.phase.tolist()]
 
 
-def _common_omega(states: tuple[ChainState, ...], place: str) -> float:
+def _common_omega(states: tuple[OperatingPoint, ...], place: str) -> float:
     driven = {state.omega for state in states if state.epsilon} or {states[0].omega}
     if len(driven) > 1:
         raise WaveformError(f"{place}: its chains are driven at omega {sorted(driven)}; plan one omega for a row")

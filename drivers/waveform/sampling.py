@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import ChainState, FramePlan, Plan, Ramp
+from planner import DriveTone, FirstOrderHold, FramePlan, OperatingPoint, Plan, Ramp, curve, tones_of
 
 from ..channels import Channel, Role, channels_of
-from .curve import curve
-from .hold import hold_inverse
 from .shaping import Shaper
 from .timeline import Stretch, stretches
 
@@ -122,10 +119,10 @@ class Waveform:
             if first < number:
                 out[number] = out[first]
             else:
-                for tone in _tones(state, ramp):
+                for tone in tones_of(state, ramp):
                     if tone.omega not in carriers:
                         carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
-                    _drive(tone, ramp, since_s, carriers[tone.omega], out[number])
+                    _drive(tone, since_s, carriers[tone.omega], out[number])
         drives = out[: len(frame.states)]
         drives /= device.epsilon_per_volt
         if device.bias == "actuator":
@@ -137,20 +134,17 @@ class Waveform:
 
 @dataclass(frozen=True)
 class _Carrier:
-    """cos and sin of omega tau at the samples of a chunk, float64, shape (S,), and what the hold takes away.
-
-    An envelope E is sampled as ``gain E + i lead_s E'``, E' per second (see `hold_inverse`).
-    """
+    """cos and sin of omega tau at the samples of a chunk, float64, shape (S,), and what the hold takes away."""
 
     cos: Floats
     sin: Floats
-    gain: float
-    lead_s: float
+    hold: FirstOrderHold
+    tau_per_s: float
 
     @classmethod
     def of(cls, omega: float, tau: Floats, device: Device) -> _Carrier:
-        gain, lead = hold_inverse(omega, device.tau_per_s / device.amplifier.rate_hz)
-        return cls(np.cos(omega * tau), np.sin(omega * tau), gain, lead / device.tau_per_s)
+        hold = FirstOrderHold.of(omega, device.tau_per_s / device.amplifier.rate_hz)
+        return cls(np.cos(omega * tau), np.sin(omega * tau), hold, device.tau_per_s)
 
 
 def _ramp_samples(ramp: Ramp | None, since_s: Floats) -> int:
@@ -158,42 +152,18 @@ def _ramp_samples(ramp: Ramp | None, since_s: Floats) -> int:
     return 0 if ramp is None else int(np.searchsorted(since_s, ramp.duration_s))
 
 
-class _DriveTone(NamedTuple):
-    """One tone of a drive: what it holds after the ramp, and its envelope during it."""
-
-    omega: float
-    held: complex
-    nodes: Complexes | None
-    slopes: Complexes | None
-
-
-def _tones(state: ChainState, ramp: Ramp | None) -> Iterator[_DriveTone]:
-    """The tones that sound, each frequency once."""
-    held = {state.omega: state.epsilon} | {tone.omega: tone.epsilon for tone in state.tones}
-    way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
-    if ramp is not None:
-        way = {state.omega: (ramp.epsilon, ramp.epsilon_slope)}
-        way |= {tone.omega: (tone.epsilon, tone.epsilon_slope) for tone in ramp.tones}
-    for omega in dict.fromkeys([*held, *way]):
-        tone = _DriveTone(omega, held.get(omega, 0j), *way.get(omega, (None, None)))
-        if tone.held or tone.nodes is not None:
-            yield tone
-
-
-def _drive(tone: _DriveTone, ramp: Ramp | None, since_s: Floats, carrier: _Carrier, out: Floats) -> None:
+def _drive(tone: DriveTone, since_s: Floats, carrier: _Carrier, out: Floats) -> None:
     """Add one tone of the dimensionless drive force of one chain to `out`, shape (S,)."""
-    end = _ramp_samples(ramp, since_s)
-    if end and ramp is not None and tone.nodes is not None:
-        envelope = carrier.gain * curve(since_s[:end], ramp.t_s, tone.nodes, tone.slopes)
-        if tone.slopes is not None:
-            envelope += 1j * carrier.lead_s * np.interp(since_s[:end], ramp.t_s, tone.slopes)
+    end = int(np.searchsorted(since_s, tone.end_s))
+    envelope = tone.on_ramp(since_s[:end], carrier.hold, carrier.tau_per_s)
+    if envelope is not None:
         out[:end] += envelope.real * carrier.cos[:end] - envelope.imag * carrier.sin[:end]
     if tone.held and end < len(out):
-        held = carrier.gain * tone.held
+        held = carrier.hold.gain * tone.held
         out[end:] += held.real * carrier.cos[end:] - held.imag * carrier.sin[end:]
 
 
-def _bias(state: ChainState, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:
+def _bias(state: OperatingPoint, ramp: Ramp | None, since_s: Floats, per_volt: float, out: Floats) -> None:
     """Put the bias volts of one chain's actuators into `out`, shape (n, S), which is zero."""
     end = _ramp_samples(ramp, since_s) if ramp is not None and ramp.bias is not None else 0
     for actuator, row in enumerate(out):

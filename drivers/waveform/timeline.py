@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from planner import ChainState, FramePlan, Ramp
+from planner import FramePlan, OperatingPoint, Ramp
 
 from ..errors import WaveformError
 
@@ -77,7 +77,7 @@ def _check_chains(place: str, device: Device, frame: FramePlan) -> None:
         checked.update((id(state), id(ramp)))
 
 
-def _check_state(where: str, device: Device, state: ChainState) -> None:
+def _check_state(where: str, device: Device, state: OperatingPoint) -> None:
     n = device.chain_length
     _check_array(f"{where}: target", state.target, (n,))
     _check_array(f"{where}: bias", state.bias, (n,))

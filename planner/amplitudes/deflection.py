@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 from chainsim import Closure, Outcome, Setting, solve
 
 from ..closed_forms.links import stages
+from ..family import AmplitudeFamily
 from ..margins import WELL_SHARE
-from ..plan import ChainState, Margins, Ramp
-from ..strategy import Strategy
+from ..operating_point import Margins, OperatingPoint
+from ..plan import Ramp
 from ..transitions import jets
 
 __all__ = ["Deflection"]
@@ -28,17 +30,13 @@ NODES = 65
 TOL = 1e-12
 
 
-class Deflection(Strategy):
+class Deflection(AmplitudeFamily):
     """b_m = z_m + beta z_m^3 - lam (z_{m-1} - z_m) for any wanted deflection, with the smallest lam there is."""
 
     @property
     def ramp_s(self) -> float:
         """Length of every ramp in seconds."""
         return RAMP_PERIODS / self.device.f0_hz
-
-    def held(self, target: Floats, started: bool) -> Floats:
-        """Just what is wanted: a still actuator costs nothing."""
-        return target
 
     def _bias(self, z: Floats, force: Floats) -> Floats:
         """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
@@ -57,7 +55,7 @@ class Deflection(Strategy):
             links[1:] *= device.lam_gain(0)
         return links
 
-    def states(self, targets: Floats) -> list[ChainState]:
+    def states(self, targets: Floats) -> list[OperatingPoint]:
         """Static settings for `targets`, checked by the static solver."""
         device = self.device
         biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
@@ -71,7 +69,7 @@ class Deflection(Strategy):
         response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
         error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
         return [
-            ChainState(
+            OperatingPoint(
                 target=targets[i],
                 epsilon=0j,
                 lam=lam,
@@ -119,7 +117,9 @@ class Deflection(Strategy):
         """What is lacking when a deflection cannot be held."""
         return f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well."
 
-    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+    def ramps(
+        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+    ) -> list[Ramp | None]:
         """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
         duration = self.ramp_s * self.device.tau_per_s
         blend = jets.smoothstep(SMOOTHNESS, NODES, 4)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain, links_for
-from ..closed_forms.wave_fit import Hold
+from ..family import AmplitudeFamily, PatternFamily
 from ..margins import WELL_SHARE, converter_error, lacking_of, slew_of
-from ..plan import ChainState, Margins, Ramp
-from ..strategy import Strategy
+from ..operating_point import Margins, OperatingPoint
+from ..plan import Ramp
 from ..transitions import jets
 from ..transitions.envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
 from ..transitions.hermite import broken_line
@@ -37,16 +38,23 @@ FINE_PIECE_S = 1.5e-3
 DELICATE = 1e6
 
 
-class Vibration(Strategy):
+class Vibration(AmplitudeFamily):
     """Amplitude profiles by closed-form links, refined on harmonic balance; flat ramps between them."""
 
     def __init__(
         self, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: Vibration | None = None
     ) -> None:
-        """`kinds`, `whole` : as in `strategy_for`; all chains of a device share one band."""
+        """`kinds`, `whole` : as in `families.family_of`; all chains of a device share one band."""
         super().__init__(device)
         self.contrast_db = contrast_db
         self._kinds, self._whole = kinds, whole
+
+    @classmethod
+    def of(
+        cls, device: Device, contrast_db: float, kinds: Sequence[Device] = (), whole: PatternFamily | None = None
+    ) -> Self:
+        """The family on a device, or on one chain of the device that `whole` is for."""
+        return cls(device, contrast_db, kinds, whole if isinstance(whole, Vibration) else None)
 
     @cached_property
     def band(self) -> Band:
@@ -58,7 +66,7 @@ class Vibration(Strategy):
         """Length of the longest ramps in seconds."""
         return self.band.ramp_s
 
-    def held(self, target: Floats, started: bool) -> Floats:
+    def levels(self, target: Floats, started: bool) -> Floats:
         """A chain rests until its first dot; after it, unraised dots idle near the floor, for fast changes.
 
         Each takes the floor or half of it, whichever mix magnifies disturbances of the drive least: equal
@@ -78,7 +86,7 @@ class Vibration(Strategy):
         """What is lacking."""
         return f"{self.device.name} cannot make this pattern by vibration: {self.band.lacking or 'it is out of reach'}."
 
-    def states(self, targets: Floats) -> list[ChainState]:
+    def states(self, targets: Floats) -> list[OperatingPoint]:
         """Settings for amplitude targets; all zero is rest, and so is what no links can hold (unreachable).
 
         Under spread the states aim beside the targets, where the expected error is least.
@@ -103,18 +111,18 @@ class Vibration(Strategy):
         pairs = zip(targets, known, strict=True)
         return np.array([aim_for(self.device, one, *common) if fine else one for one, fine in pairs])
 
-    def _rounded(self, state: ChainState) -> ChainState:
+    def _rounded(self, state: OperatingPoint) -> OperatingPoint:
         """With what the steps of a converter leave."""
-        noise = converter_error(self.device, Hold(state.epsilon, state.lam, state.omega)) if state.epsilon else 0.0
+        noise = converter_error(self.device, state) if state.epsilon else 0.0
         return replace(state, error=state.error + noise / self.device.full_scale)
 
-    def _exact(self, targets: Floats) -> list[ChainState]:
+    def _exact(self, targets: Floats) -> list[OperatingPoint]:
         chain, omega = self.device.chain, self.band.omega
         moving = np.flatnonzero(np.any(targets > 0, axis=1))
         amplitude = targets[moving] * self.device.full_scale
         holdable = np.isfinite(links_for(chain, amplitude, omega)).all(axis=1)
         held, amplitude = moving[holdable], amplitude[holdable]
-        states: dict[int, ChainState | None] = dict.fromkeys(range(len(targets)))
+        states: dict[int, OperatingPoint | None] = dict.fromkeys(range(len(targets)))
         if len(held):
             found = refine(chain, amplitude, omega)
             gain = detuning_gain(chain, amplitude, found.lam, omega)
@@ -122,9 +130,9 @@ class Vibration(Strategy):
             states.update(zip(held.tolist(), made, strict=True))
         return [state or self._rest(targets[index]) for index, state in states.items()]
 
-    def _rest(self, target: Floats) -> ChainState:
+    def _rest(self, target: Floats) -> OperatingPoint:
         n = self.device.chain_length
-        return ChainState(
+        return OperatingPoint(
             target=target,
             epsilon=0j,
             lam=np.full(n - 1, self.device.coupling.lam.min),
@@ -137,7 +145,7 @@ class Vibration(Strategy):
             outcome=Outcome.UNREACHABLE if np.any(target) else Outcome.OK,
         )
 
-    def _state(self, target: Floats, found: Refined, i: int, gain: float) -> ChainState:
+    def _state(self, target: Floats, found: Refined, i: int, gain: float) -> OperatingPoint:
         device = self.device
         margins = Margins(
             volts=abs(found.epsilon[i]) / device.epsilon_max,
@@ -145,7 +153,7 @@ class Vibration(Strategy):
             noise_gain=float(gain),
             slew=slew_of(device, abs(found.epsilon[i]), self.band.omega),
         )
-        return ChainState(
+        return OperatingPoint(
             target=target,
             epsilon=complex(found.epsilon[i]),
             lam=found.lam[i],
@@ -172,7 +180,9 @@ class Vibration(Strategy):
             lam = lam / device.lam_gain(0)
         return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
 
-    def ramps(self, before: list[ChainState], after: list[ChainState]) -> list[Ramp | None]:
+    def ramps(
+        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+    ) -> list[Ramp | None]:
         """From rest and to rest along the flat output; between patterns with links that vary in time."""
         chain, band = self.device.chain, self.band
         old = np.array([_standing(state) for state in before]) * self.device.full_scale
@@ -188,7 +198,7 @@ class Vibration(Strategy):
             if len(index):
                 duration = ramp_s * self.device.tau_per_s
                 made = way(chain, *(end[index] for end in ends), band.omega, duration, NODES_PER_RAMP)
-                ramps = self._ramps(made, ramp_s, [before[i] for i in index], [after[i] for i in index])
+                ramps = self._ramps(made, ramp_s, [before[int(i)] for i in index], [after[int(i)] for i in index])
                 for i, ramp in zip(index, ramps, strict=True):
                     out[i] = ramp
 
@@ -198,7 +208,7 @@ class Vibration(Strategy):
         return out
 
     def _ramps(
-        self, made: EnvelopeRamp, ramp_s: float, before: list[ChainState], after: list[ChainState]
+        self, made: EnvelopeRamp, ramp_s: float, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint]
     ) -> list[Ramp]:
         """Ramps moved by the little that separates their closed-form ends from the refined states."""
         blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)
@@ -225,7 +235,7 @@ class Vibration(Strategy):
         ]
 
     def _courses(
-        self, made: EnvelopeRamp, ramp_s: float, before: list[ChainState], after: list[ChainState]
+        self, made: EnvelopeRamp, ramp_s: float, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint]
     ) -> list[Floats]:
         """What the links of every ramp do in straight pieces; float64, shape (pieces + 1, n-1) each."""
         blend = jets.smoothstep(ROUGHEST, NODES_PER_RAMP, 2)[0]
@@ -262,6 +272,6 @@ class Vibration(Strategy):
         return ""
 
 
-def _standing(state: ChainState) -> Floats:
+def _standing(state: OperatingPoint) -> Floats:
     """The target a state stands at: nothing where it could only stay at rest."""
     return state.target if np.any(state.phasor) else np.zeros_like(state.target)

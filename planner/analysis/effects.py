@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Closure, Device
+from chainsim import Chain, Closure
 
-from ..plan import ChainState
-from ..robustness.spread import Spread
+from ..operating_point import OperatingPoint, PointTone
+from ..robustness.spread import RelativeSpread
 from ..surroundings import HigherMode, Surroundings
 
-__all__ = ["Line", "StandingChain", "pattern_error"]
+__all__ = ["Linearisation", "pattern_error"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -30,50 +30,34 @@ DECADES, RELAXATIONS_A_DECADE = 3, 2
 
 
 @dataclass(frozen=True)
-class Line:
-    """One frequency of a chain's motion, or its constant deflection (omega 0).
+class Linearisation:
+    """The equations of a chain about an operating point: what small forces do to its motion.
 
     Attributes
     ----------
-    drive : complex force on the first actuator. phasor : complex128, shape (n,), the known motion.
-    """
-
-    omega: float
-    drive: complex
-    phasor: Complexes
-
-
-@dataclass(frozen=True)
-class StandingChain:
-    """A chain that stands, and what small forces do to it.
-
-    Attributes
-    ----------
-    chain : what was built. lam : float64, shape (n,), links; the first closes a ring and is 0 otherwise.
-    bias : float64, shape (n,). lines : of its vibration, the first is the state's own; one of omega 0 for a deflection.
+    chain : what was built. point : what it is driven at, and its motion.
     """
 
     chain: Chain
-    lam: Floats
-    bias: Floats
-    lines: tuple[Line, ...]
+    point: OperatingPoint
 
-    @classmethod
-    def of(cls, device: Device, state: ChainState) -> StandingChain:
-        """The chain that holds a planned state."""
-        closing = state.lam[:1] if device.coupling.closure is Closure.RING else np.zeros(1)
-        lam = np.concatenate([closing, state.lam])
-        if not state.moving:
-            lines: tuple[Line, ...] = (Line(0.0, 0j, state.mean.astype(np.complex128)),)
-        else:
-            tones = ((tone.omega, tone.epsilon, tone.phasor) for tone in state.tones)
-            lines = (Line(state.omega, state.epsilon, state.phasor), *(Line(*tone) for tone in tones))
-        return cls(device.chain, lam, state.bias, lines)
+    @cached_property
+    def lam(self) -> Floats:
+        """Links, float64, shape (n,); the first closes a ring and is 0 otherwise."""
+        closing = self.point.lam[:1] if self.chain.closure is Closure.RING else np.zeros(1)
+        return np.concatenate([closing, self.point.lam])
+
+    @cached_property
+    def lines(self) -> tuple[PointTone, ...]:
+        """Of its vibration, the first is that at the point's own frequency; one of omega 0 for a deflection."""
+        if not self.moving:
+            return (PointTone(0.0, 0j, self.point.mean.astype(np.complex128)),)
+        return self.point.every_tone
 
     @cached_property
     def moving(self) -> bool:
         """Whether it vibrates."""
-        return self.lines[0].omega > 0
+        return self.point.moving
 
     @cached_property
     def scale(self) -> float:
@@ -85,11 +69,11 @@ class StandingChain:
         """Largest amplitude of each actuator, all lines in step; float64, shape (n,)."""
         return np.asarray(np.sum([np.abs(line.phasor) for line in self.lines], axis=0))
 
-    def electric(self, line: Line) -> Complexes:
+    def electric(self, line: PointTone) -> Complexes:
         """Force through the piezo of each actuator: drive, bias, and what its link brings; complex128, shape (n,)."""
         force = self.lam * (np.roll(line.phasor, 1) - line.phasor)
-        force[0] += line.drive
-        return force + (self.bias if line.omega == 0 else 0.0)
+        force[0] += line.epsilon
+        return force + (self.point.bias if line.omega == 0 else 0.0)
 
     def impedance(self, omega: float, stiffening: Floats | float = 0.0) -> Complexes:
         """Linear equations ``impedance @ A = force`` at a frequency, links in; complex128, shape (n, n)."""
@@ -99,7 +83,7 @@ class StandingChain:
         matrix[np.arange(n), np.arange(n) - 1] -= self.lam
         return matrix
 
-    def moved(self, line: Line, force: Complexes) -> Complexes:
+    def moved(self, line: PointTone, force: Complexes) -> Complexes:
         """How a line changes under further forces of shape (n,) or (n, k), to first order; complex128, same shape."""
         beta, size2 = self.chain.betas, self.size**2
         if not self.moving:
@@ -116,8 +100,8 @@ class StandingChain:
         """What each line would be in a linear chain, less what it is."""
         found = []
         for line in self.lines:
-            force = self.bias.astype(np.complex128) if line.omega == 0 else np.zeros(self.chain.n, np.complex128)
-            force[0] += line.drive
+            force = self.point.bias.astype(np.complex128) if line.omega == 0 else np.zeros(self.chain.n, np.complex128)
+            force[0] += line.epsilon
             found.append(np.linalg.solve(self.impedance(line.omega), force) - line.phasor)
         return found
 
@@ -179,7 +163,7 @@ class StandingChain:
             found.append(tip + self.moved(line, self.lam * (np.roll(tip, 1) - tip)))
         return found
 
-    def pulled(self, row_lam: float, above: StandingChain) -> list[Complexes]:
+    def pulled(self, row_lam: float, above: Linearisation) -> list[Complexes]:
         """What links from the chain above do; lines of other frequencies than its own only stiffen it.
 
         A chain at rest is moved along by every line of the one above; all in step.
@@ -193,7 +177,7 @@ class StandingChain:
             found.append(self.moved(line, row_lam * ((same[0] if same else 0.0) - line.phasor)))
         return found
 
-    def _moved_along(self, row_lam: float, line: Line) -> Floats:
+    def _moved_along(self, row_lam: float, line: PointTone) -> Floats:
         return np.asarray(np.abs(np.linalg.solve(self.impedance(line.omega, row_lam), row_lam * line.phasor)))
 
     def through_amplifier(self, bandwidth: float, slew: float) -> list[Complexes]:
@@ -202,11 +186,11 @@ class StandingChain:
         for line in self.lines:
             factor = (1 / (1 + 1j * line.omega / bandwidth)) / max(1.0, slew)
             force = np.zeros(self.chain.n, np.complex128)
-            force[0] = (factor - 1) * line.drive
+            force[0] = (factor - 1) * line.epsilon
             found.append(self.moved(line, force))
         return found
 
-    def scattered(self, spread: Spread, phased: NDArray[np.bool_]) -> Floats:
+    def scattered(self, spread: RelativeSpread, phased: NDArray[np.bool_]) -> Floats:
         """Standard deviation of each actuator's amplitude, or of its phasor where `phased`; float64, shape (n,)."""
         total, chain = np.zeros(self.chain.n), self.chain
         for line in self.lines:
@@ -226,7 +210,9 @@ class StandingChain:
         return np.sqrt(total)
 
 
-def pattern_error(states: tuple[ChainState, ...], chains: list[StandingChain], changes: list[list[Complexes]]) -> float:
+def pattern_error(
+    states: tuple[OperatingPoint, ...], chains: list[Linearisation], changes: list[list[Complexes]]
+) -> float:
     """Worst change of an actuator: of its amplitude, or of its phasor but for a turn that a frequency has in common."""
     worst = 0.0
     shared: dict[float, complex] = {}

@@ -7,19 +7,20 @@ and way in are tried in the full equations from rest, so that the error is that 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, GridIntegrator
+from chainsim import Closure, Device
 from encoders import TargetPattern
 
 from ..amplitudes.floor import LOWER, idle_profiles
 from ..closed_forms.links import detuning_gain, links_for
-from ..transitions.check import Way
+from ..drive import FirstOrderHold, cubic, cubic_slope, felt, full_motion
+from ..operating_point import OperatingPoint
 from ..transitions.envelopes import EnvelopeRamp, change, rise
-from .effects import Line, StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoError, ParetoFront, ParetoPoint, front_of
 
 __all__ = ["ParetoError", "ParetoFront", "ParetoPoint", "front_of", "pareto_of"]
@@ -133,14 +134,12 @@ class _Candidates:
     def _scatter(self, way: EnvelopeRamp) -> float:
         chain, worst = self.device.chain, 0.0
         for target, epsilon, lam in zip(self.target, way.epsilon[:, -1], self.lam, strict=True):
-            drive, bias = complex(epsilon), np.zeros(chain.n)
-            links, nowhere = np.concatenate([[0.0], lam]), np.zeros(chain.n, np.complex128)
+            point = OperatingPoint(complex(epsilon), lam, self.omega)
             stiffening = 0.75 * chain.beta * (target * self.device.full_scale) ** 2
-            silent = StandingChain(chain, links, bias, (Line(self.omega, drive, nowhere),))
-            force = np.concatenate([[drive], nowhere[1:]])
-            phasor = np.asarray(np.linalg.solve(silent.impedance(self.omega, stiffening), force), np.complex128)
-            standing = StandingChain(chain, links, bias, (Line(self.omega, drive, phasor),))
-            worst = max(worst, float(standing.scattered(SIGMA, np.zeros(chain.n, np.bool_)).max()))
+            force = np.concatenate([[point.epsilon], np.zeros(chain.n - 1, np.complex128)])
+            impedance = Linearisation(chain, point).impedance(self.omega, stiffening)
+            point = replace(point, phasor=np.asarray(np.linalg.solve(impedance, force), np.complex128))
+            worst = max(worst, float(Linearisation(chain, point).scattered(SIGMA, np.zeros(chain.n, np.bool_)).max()))
         return worst / self.device.full_scale
 
     def _felt(self, ways: list[EnvelopeRamp]) -> tuple[Complexes, Floats]:
@@ -150,23 +149,19 @@ class _Candidates:
         ends = [math.ceil(ramp_s * self.device.tau_per_s / dtau) for ramp_s in RAMPS_S]
         tau = dtau * np.arange(max(ends) + LOOKED_AT * SAMPLES_PER_PERIOD, dtype=np.float64)
         carrier = np.exp(1j * self.omega * tau)
-        force = np.zeros((len(tau), len(ways) * count, chain.n))
+        force, hold = np.zeros((len(tau), len(ways) * count)), FirstOrderHold.of(self.omega, dtau)
         for at, (way, ramp_s) in enumerate(zip(ways, RAMPS_S, strict=True)):
             nodes = np.linspace(0.0, ramp_s * self.device.tau_per_s, NODES)
             for p in range(count):
-                lone = Way(nodes, way.epsilon[p], way.epsilon_slope[p], np.zeros(1), np.zeros((1, 0)))
-                force[:, at * count + p, 0] = held_between(*lone.drive(tau), carrier, self.omega * dtau, dtau)
+                drive = tau, nodes, way.epsilon[p], way.epsilon_slope[p]
+                force[:, at * count + p] = (hold.raised(cubic(*drive), cubic_slope(*drive)) * carrier).real
         lam = np.tile(np.pad(self.lam, ((0, 0), (1, 0))), (len(ways), 1))
-        grid = GridIntegrator(
-            shape=lam.shape, chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
-        )  # fmt: skip
-        z = grid.advance(force, lam).reshape(len(tau), len(ways), count, chain.n)
-        felt = []
+        z = full_motion(chain, dtau, force, lam).reshape(len(tau), len(ways), count, chain.n)
+        after = []
         for at, end in enumerate(ends):
             late = slice(end, end + LOOKED_AT * SAMPLES_PER_PERIOD)
-            turned = z[late, at] * carrier[late, None, None].conj()
-            felt.append(2 * turned.reshape(LOOKED_AT, SAMPLES_PER_PERIOD, count, chain.n).mean(axis=1))
-        return np.array(felt), np.abs(z).max(axis=(0, 2, 3))
+            after.append(felt(z[late, at], carrier[late, None, None], SAMPLES_PER_PERIOD))
+        return np.array(after), np.abs(z).max(axis=(0, 2, 3))
 
 
 def _quietest(device: Device, wish: Floats, floor: float, omega: float) -> Floats:
@@ -177,11 +172,3 @@ def _quietest(device: Device, wish: Floats, floor: float, omega: float) -> Float
     amplitude = profiles * device.full_scale
     gain = detuning_gain(device.chain, amplitude, links_for(device.chain, amplitude, omega), omega)
     return np.asarray(profiles[int(np.argmin(np.where(np.isfinite(gain), gain, np.inf)))])
-
-
-def held_between(value: Complexes, slope: Complexes, carrier: Complexes, turn: float, dtau: float) -> Floats:
-    """Samples whose straight connections are the envelope on its carrier (they pass it with sinc^2 of half a turn)."""
-    half = turn / 2
-    sinc = math.sin(half) / half
-    tilt = dtau * sinc * (half * math.cos(half) - math.sin(half)) / half**2
-    return np.asarray(((value / sinc**2 + 1j * slope * tilt / sinc**4) * carrier).real)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..amplitudes.deflection import SMOOTHNESS, Deflection
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
 from ..transitions import jets
-from .effects import StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoPoint
 
 __all__ = ["ways_of_deflections"]
@@ -35,9 +35,9 @@ def ways_of_deflections(wishes: Floats, device: Device) -> tuple[list[ParetoPoin
     ----------
     wishes : float64, shape (P, n), in units of full scale.
     """
-    strategy = Deflection(device)
-    rest = strategy.states(np.zeros_like(wishes))
-    states = strategy.states(wishes)
+    family = Deflection(device)
+    rest = family.states(np.zeros_like(wishes))
+    states = family.states(wishes)
     if any(state.outcome is not Outcome.OK for state in states):
         return [], len(PERIODS)
     still = max(_scatter(device, state) for state in states)
@@ -72,9 +72,9 @@ def _peak(bias: Floats | None) -> float:
     return 0.0 if bias is None else float(np.abs(bias).max())
 
 
-def _scatter(device: Device, state: ChainState) -> float:
+def _scatter(device: Device, state: OperatingPoint) -> float:
     """Standard deviation of the worst actuator while the deflection stands, in units of full scale."""
-    scattered = StandingChain.of(device, state).scattered(SIGMA, np.zeros(device.chain_length, np.bool_))
+    scattered = Linearisation(device.chain, state).scattered(SIGMA, np.zeros(device.chain_length, np.bool_))
     return float(scattered.max()) / device.full_scale
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from chainsim import Closure, Device, Outcome
 from encoders import TargetPattern
 
-from ..plan import ChainState
+from ..operating_point import OperatingPoint
+from ..targets import WaveTarget, targets_of
 from ..transitions.rise import find_way
 from ..transitions.search import STANDS
 from ..transitions.waves import BUDGET, limits_of
 from ..waves.wave_state import wave_state
-from ..wish import ChainWish, wishes_of
-from .effects import StandingChain
+from .effects import Linearisation
 from .pareto_point import SIGMA, ParetoError, ParetoPoint
 
 __all__ = ["ways_of_waves"]
@@ -40,13 +40,13 @@ def ways_of_waves(pattern: TargetPattern, device: Device) -> tuple[list[ParetoPo
     """
     if device.coupling.closure is not Closure.OPEN:
         raise ParetoError(f"device: {device.name} is of rings, whose waves rise by one slow way; give open chains")
-    wishes = {}
-    for wish, _ in wishes_of(pattern, device):
-        if isinstance(wish, ChainWish):
-            wishes[wish.key] = wish
-        elif np.any(wish):
+    targets: dict[WaveTarget, None] = {}
+    for target in targets_of(pattern, device):
+        if isinstance(target, WaveTarget):
+            targets[target.unturned] = None
+        elif not target.resting:
             raise ParetoError("frame: some of its chains have no phases; give waves alone, or amplitudes alone")
-    states = [wave_state(device, wish) for wish in wishes.values()]
+    states = [wave_state(device, target) for target in targets]
     lacking = next((state.lacking for state in states if state.outcome is not Outcome.OK), "")
     if lacking:
         raise ParetoError(f"frame: {device.name} cannot make it: {lacking}")
@@ -71,11 +71,11 @@ def _both(one: ParetoPoint, other: ParetoPoint) -> ParetoPoint:
     return replace(one, **worse)
 
 
-def _ways(device: Device, state: ChainState) -> list[ParetoPoint]:
+def _ways(device: Device, state: OperatingPoint) -> list[ParetoPoint]:
     """Ways to one wave; empty where none is found."""
     limits = limits_of(device, device.coupling.scope in ("chain", "link"))
     phased = np.zeros(device.chain_length, np.bool_) if state.phase is None else np.isfinite(state.phase)
-    scattered = StandingChain.of(device, state).scattered(SIGMA, phased)
+    scattered = Linearisation(device.chain, state).scattered(SIGMA, phased)
     spread = float(scattered.max()) / device.full_scale
     # What a way may leave, of each amplitude, counts to the error.
     made = STANDS / 2 * float(state.target.max())

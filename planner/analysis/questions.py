@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Closure, Device, Outcome, Response, Setting, Start, load_rung, solve
+from chainsim import Chain, Device, Outcome, Response, Setting, Start, load_rung, solve
 
 from ..errors import PlanError
-from ..plan import ChainState, FramePlan
+from ..operating_point import OperatingPoint, setting_of
+from ..plan import FramePlan
 
 __all__ = [
     "FINEST",
@@ -74,7 +75,7 @@ def questions_of(frames: Iterable[FramePlan], device: Device) -> tuple[list[Ques
 
     Left out are chains with several tones, of which a steady rung knows nothing, and what is beyond `MOST_STATES`.
     """
-    found: dict[bytes, ChainState] = {}
+    found: dict[bytes, OperatingPoint] = {}
     for frame in frames:
         for state in frame.states:
             if state.outcome is Outcome.OK and (state.moving or state.bias.any()):
@@ -85,17 +86,9 @@ def questions_of(frames: Iterable[FramePlan], device: Device) -> tuple[list[Ques
     return [_question(device, states) for states in kinds if states], len(found) - len(kept)
 
 
-def _question(device: Device, states: list[ChainState]) -> Question:
-    lam = np.array([state.lam for state in states])
-    if device.coupling.closure is Closure.RING:
-        lam = np.concatenate([lam[:, :1], lam], axis=1)
-    drive = np.array([state.epsilon for state in states])
-    setting = Setting.of(
-        device.chain, epsilon=np.abs(drive), phase=np.angle(drive), lam=lam if lam.size else 0.0,
-        omega=np.array([state.omega for state in states]), bias=np.array([state.bias for state in states]),
-    )  # fmt: skip
+def _question(device: Device, states: list[OperatingPoint]) -> Question:
     planned = np.array([state.phasor if state.moving else state.mean for state in states], dtype=np.complex128)
-    return Question(device.chain, setting, planned)
+    return Question(device.chain, setting_of(device.chain, states), planned)
 
 
 def refusal(rung: str, question: Question) -> str:

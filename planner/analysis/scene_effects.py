@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..plan import ChainState, FramePlan
+from ..operating_point import OperatingPoint
+from ..plan import FramePlan
 from ..surroundings import Surroundings
-from .effects import StandingChain, pattern_error
+from .effects import Linearisation, pattern_error
 
 __all__ = ["TERMS", "SceneEffects"]
 
@@ -56,9 +57,9 @@ class SceneEffects:
     frames: int = 0
     ramp_share: float = 0.0
     end_s: float = 0.0
-    _before: tuple[ChainState, ...] = ()
+    _before: tuple[OperatingPoint, ...] = ()
     _ramp_tau: float = 0.0
-    _standing: dict[bytes, StandingChain] = field(default_factory=dict)
+    _standing: dict[bytes, Linearisation] = field(default_factory=dict)
     _alone: dict[tuple[bytes, float], dict[str, list[Complexes]]] = field(default_factory=dict)
 
     @property
@@ -76,7 +77,7 @@ class SceneEffects:
         self.end_s = plan.end_s
         keys = [_key(state) for state in plan.states]
         for key, state in zip(keys, plan.states, strict=True):
-            self._standing.setdefault(key, StandingChain.of(self.device, state))
+            self._standing.setdefault(key, Linearisation(self.device.chain, state))
         chains = [self._standing[key] for key in keys]
         scale = max(chain.scale for chain in chains)
         self._transient(plan, scale)
@@ -85,7 +86,7 @@ class SceneEffects:
         if scale > 0 and np.isfinite(scale):
             self._steady(plan, keys, chains, scale)
 
-    def _steady(self, plan: FramePlan, keys: list[bytes], chains: list[StandingChain], scale: float) -> None:
+    def _steady(self, plan: FramePlan, keys: list[bytes], chains: list[Linearisation], scale: float) -> None:
         changes = [self._changes(key, state, plan.end_s) for key, state in zip(keys, plan.states, strict=True)]
         beside = self.device.chains_per_row
         for at, chain in enumerate(chains):
@@ -103,7 +104,7 @@ class SceneEffects:
         effect = safety * effect if math.isfinite(effect) else math.inf
         self.effects[name] = max(self.effects[name], effect)
 
-    def _changes(self, key: bytes, state: ChainState, end_s: float) -> dict[str, list[Complexes]]:
+    def _changes(self, key: bytes, state: OperatingPoint, end_s: float) -> dict[str, list[Complexes]]:
         """How the lines of one chain change for each term; creep of a deflection grows with time."""
         known = key, 0.0 if state.moving else end_s
         if known not in self._alone:
@@ -181,13 +182,13 @@ class SceneEffects:
         return STAGES * rate * EFOLDS * (1 + self.device.chain_length) / self.device.delta
 
 
-def _felt(state: ChainState) -> Floats:
+def _felt(state: OperatingPoint) -> Floats:
     """Amplitudes or deflections, the lines of a beat in step."""
     tones = [np.abs(tone.phasor) for tone in state.tones]
     return np.asarray(np.sum([np.abs(state.phasor + state.mean), *tones], axis=0))
 
 
-def _key(state: ChainState) -> bytes:
+def _key(state: OperatingPoint) -> bytes:
     numbers = [state.phasor.view(np.float64), state.mean, state.lam, state.bias, [state.omega]]
     numbers += [one.phasor.view(np.float64) for one in state.tones]
     return np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in numbers]).tobytes()

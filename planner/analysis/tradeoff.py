@@ -29,7 +29,7 @@ from .questions import (
     seconds_words,
 )
 
-__all__ = ["Choice", "Price", "Tradeoff", "TradeoffRow", "by_clock", "trade_off"]
+__all__ = ["Price", "Tradeoff", "TradeoffChoice", "TradeoffRow", "by_clock", "trade_off"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -76,7 +76,7 @@ class TradeoffRow:
 
 
 @dataclass(frozen=True)
-class Choice:
+class TradeoffChoice:
     """The row that answers a wish, whether the wish is met, and a sentence that says what was reached."""
 
     row: TradeoffRow
@@ -117,23 +117,25 @@ class Tradeoff:
                 found.append(row)
         return tuple(found)
 
-    def within(self, budget_s: float) -> Choice:
+    def within(self, budget_s: float) -> TradeoffChoice:
         """The most accurate answer in a time."""
         positive("budget", budget_s)
         fits = [row for row in self.front if row.seconds <= budget_s]
         row = fits[-1] if fits else self.front[0]
         asked = f"Best answer in {seconds_words(budget_s)}"
-        return Choice(
+        return TradeoffChoice(
             row, bool(fits), f"{asked}: {_told(row)}." if fits else f"{asked}: none; the fastest, {_told(row)}."
         )
 
-    def cheapest(self, tol: float) -> Choice:
+    def cheapest(self, tol: float) -> TradeoffChoice:
         """The fastest answer that is accurate enough."""
         positive("tol", tol)
         good = [row for row in self.front if row.error <= tol]
         row = good[0] if good else self.front[-1]
         asked = f"Cheapest answer to {tol:g}"
-        return Choice(row, bool(good), f"{asked}: {_told(row)}." if good else f"{asked}: none; the best, {_told(row)}.")
+        return TradeoffChoice(
+            row, bool(good), f"{asked}: {_told(row)}." if good else f"{asked}: none; the best, {_told(row)}."
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""

@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Outcome, Response, Setting, balance_near, gradient
+from chainsim import Chain, Outcome, Response, balance_near, gradient
 
-__all__ = ["Fitted", "Freedom", "Hold", "Wanted", "fit", "response_to"]
+from ..operating_point import OperatingPoint, setting_of
+
+__all__ = ["FittedPoint", "Freedom", "MotionTarget", "fit", "response_to"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,7 +34,7 @@ DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MotionTarget:
     """A motion that is wished for.
 
     Attributes
@@ -88,19 +90,10 @@ class Freedom:
 
 
 @dataclass(frozen=True)
-class Hold:
-    """Settings of one chain: drive phasor, links (float64, shape (n-1,)), frequency over f0."""
+class FittedPoint:
+    """An operating point, what is held there, and the worst deviation (infinite where nothing near it is held)."""
 
-    epsilon: complex
-    lam: Floats
-    omega: float
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """Settings, what they hold, and the worst deviation from the wish (infinite where they hold nothing near it)."""
-
-    hold: Hold
+    point: OperatingPoint
     response: Response
     error: float
 
@@ -118,21 +111,12 @@ class Fitted:
         return Outcome.UNSTABLE if found is Outcome.OK and not self.response.stable[0] else found
 
 
-def response_to(chain: Chain, hold: Hold, guess: Complexes) -> Response:
-    """What a chain does under settings, near a known motion: complex128, shape (n,)."""
-    return balance_near(chain, _setting(chain, [hold]), guess[None, :], tol=TOL)
+def response_to(chain: Chain, point: OperatingPoint, guess: Complexes) -> Response:
+    """What a chain does at an operating point, near a known motion: complex128, shape (n,)."""
+    return balance_near(chain, setting_of(chain, [point]), guess[None, :], tol=TOL)
 
 
-def _setting(chain: Chain, holds: list[Hold]) -> Setting:
-    lam = np.array([one.lam for one in holds])
-    if not chain.feed_forward:
-        lam = np.concatenate([lam[:, :1], lam], axis=1)
-    epsilon = np.array([one.epsilon for one in holds])
-    omega = np.array([one.omega for one in holds])
-    return Setting.of(chain, epsilon=np.abs(epsilon), phase=np.angle(epsilon), lam=lam, omega=omega)
-
-
-def fit(chain: Chain, wanted: Wanted, start: Hold, freedom: Freedom) -> Fitted:
+def fit(chain: Chain, wanted: MotionTarget, start: OperatingPoint, freedom: Freedom) -> FittedPoint:
     """The settings nearest to the wish that can be walked to from `start`."""
     here = _tried(chain, wanted, _within(start, freedom), wanted.phasor)
     damping = DAMPING
@@ -143,8 +127,8 @@ def fit(chain: Chain, wanted: Wanted, start: Hold, freedom: Freedom) -> Fitted:
         if not np.isfinite(jacobian).all():
             break
         while damping <= MOST_DAMPING:
-            step = _step(jacobian, wanted.residual(here.phasor), here.hold, freedom, damping)
-            after = _tried(chain, wanted, _within(_moved(here.hold, step, freedom), freedom), here.phasor)
+            step = _step(jacobian, wanted.residual(here.phasor), here.point, freedom, damping)
+            after = _tried(chain, wanted, _within(_moved(here.point, step, freedom), freedom), here.phasor)
             if _merit(wanted, after) < _merit(wanted, here):
                 break
             damping *= 10
@@ -158,37 +142,37 @@ def fit(chain: Chain, wanted: Wanted, start: Hold, freedom: Freedom) -> Fitted:
     return here
 
 
-def _tried(chain: Chain, wanted: Wanted, hold: Hold, guess: Complexes) -> Fitted:
-    response = response_to(chain, hold, guess)
+def _tried(chain: Chain, wanted: MotionTarget, point: OperatingPoint, guess: Complexes) -> FittedPoint:
+    response = response_to(chain, point, guess)
     phasor = response.phasor[0]
     known = response.outcome[0] in (Outcome.OK, Outcome.UNSTABLE) and bool(np.isfinite(phasor).all())
-    return Fitted(hold, response, wanted.error(phasor) if known else np.inf)
+    return FittedPoint(point, response, wanted.error(phasor) if known else np.inf)
 
 
-def _merit(wanted: Wanted, fitted: Fitted) -> float:
+def _merit(wanted: MotionTarget, fitted: FittedPoint) -> float:
     return float(np.sum(wanted.residual(fitted.phasor) ** 2)) if np.isfinite(fitted.error) else np.inf
 
 
-def _moved(hold: Hold, step: Floats, freedom: Freedom) -> Hold:
+def _moved(point: OperatingPoint, step: Floats, freedom: Freedom) -> OperatingPoint:
     """Settings after a step in (log drive, phase, links, omega)."""
-    lam = hold.lam + step[2 : 2 + freedom.lam] if freedom.lam else hold.lam
-    omega = hold.omega + (float(step[-1]) if freedom.omega else 0.0)
-    return Hold(complex(hold.epsilon * np.exp(step[0] + 1j * step[1])), lam, omega)
+    lam = point.lam + step[2 : 2 + freedom.lam] if freedom.lam else point.lam
+    omega = point.omega + (float(step[-1]) if freedom.omega else 0.0)
+    return OperatingPoint(complex(point.epsilon * np.exp(step[0] + 1j * step[1])), lam, omega)
 
 
-def _within(hold: Hold, freedom: Freedom) -> Hold:
+def _within(point: OperatingPoint, freedom: Freedom) -> OperatingPoint:
     if freedom.lam:
-        hold = replace(hold, lam=np.clip(hold.lam, freedom.lam_min, freedom.lam_max))
+        point = replace(point, lam=np.clip(point.lam, freedom.lam_min, freedom.lam_max))
     if freedom.omega:
-        hold = replace(hold, omega=float(np.clip(hold.omega, freedom.omega_min, freedom.omega_max)))
-    return hold
+        point = replace(point, omega=float(np.clip(point.omega, freedom.omega_min, freedom.omega_max)))
+    return point
 
 
-def _jacobian(chain: Chain, wanted: Wanted, here: Fitted, freedom: Freedom) -> Floats:
+def _jacobian(chain: Chain, wanted: MotionTarget, here: FittedPoint, freedom: Freedom) -> Floats:
     """Derivative of the residual by log drive, phase, links and omega, shape (2 n, P)."""
     if chain.feed_forward:
-        slope = gradient(chain, _setting(chain, [here.hold]), here.response)
-        of_drive, of_omega = slope.epsilon[0] * abs(here.hold.epsilon), slope.omega[0]
+        slope = gradient(chain, setting_of(chain, [here.point]), here.response)
+        of_drive, of_omega = slope.epsilon[0] * abs(here.point.epsilon), slope.omega[0]
         of_lam = slope.lam[0] if freedom.lam != 1 else slope.lam[0].sum(axis=1, keepdims=True)
         parts = [of_drive[:, None], 1j * here.phasor[:, None]]
         parts += [of_lam] if freedom.lam else []
@@ -196,23 +180,23 @@ def _jacobian(chain: Chain, wanted: Wanted, here: Fitted, freedom: Freedom) -> F
         change = np.concatenate(parts, axis=1)
     else:
         count = 2 + freedom.lam + int(freedom.omega)
-        moved = [_moved(here.hold, row, freedom) for row in DIFFERENCE * np.eye(count)]
+        moved = [_moved(here.point, row, freedom) for row in DIFFERENCE * np.eye(count)]
         guess = np.repeat(here.phasor[None, :], count, axis=0)
-        answer = balance_near(chain, _setting(chain, moved), guess, tol=TOL)
+        answer = balance_near(chain, setting_of(chain, moved), guess, tol=TOL)
         change = (answer.phasor - here.phasor).T / DIFFERENCE
     return wanted.slope(here.phasor, change)
 
 
-def _step(jacobian: Floats, residual: Floats, hold: Hold, freedom: Freedom, damping: float) -> Floats:
+def _step(jacobian: Floats, residual: Floats, point: OperatingPoint, freedom: Freedom, damping: float) -> Floats:
     """A damped Gauss-Newton step; what stands at the end of its range and is pushed outwards stays there."""
     push = jacobian.T @ residual
     free = np.ones(jacobian.shape[1], dtype=np.bool_)
     if freedom.lam:
         links, low, high = slice(2, 2 + freedom.lam), freedom.lam_min, freedom.lam_max
-        lam = hold.lam[: freedom.lam]
+        lam = point.lam[: freedom.lam]
         free[links] = ~(((lam <= low) & (push[links] > 0)) | ((lam >= high) & (push[links] < 0)))
     if freedom.omega:
-        out = (hold.omega <= freedom.omega_min and push[-1] > 0) or (hold.omega >= freedom.omega_max and push[-1] < 0)
+        out = (point.omega <= freedom.omega_min and push[-1] > 0) or (point.omega >= freedom.omega_max and push[-1] < 0)
         free[-1] = not out
     step = np.zeros(len(free))
     scale = np.maximum(np.linalg.norm(jacobian[:, free], axis=0), 1e-300)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Outcome
 
 from ..errors import PlanError
-from ..robustness.batch_march import Motion, Parts, march
+from ..robustness.batch_march import BatchMotion, BatchParts, march
 
 __all__ = ["FEWEST_POINTS", "ChainFit", "Sweep", "SweepError", "fit_chain"]
 
@@ -183,16 +183,16 @@ class _Fit:
         self.low = np.stack([one / STRONGEST, SLACKEST * one, -cubic, 0 * one], axis=1)
         self.high = np.stack([one * STRONGEST, one, cubic, feed], axis=1)
 
-    def motion(self, x: Floats) -> Motion:
+    def motion(self, x: Floats) -> BatchMotion:
         """The chain at every setting of the sweep: phasors of shape (n, S)."""
         natural, delta, beta, feed = x.T[:, :, None]
         force = np.zeros((self.n, len(self.sweep.omega)), dtype=np.complex128)
         force[0] = feed[0] * self.sweep.volts
         lam = np.concatenate([np.zeros((1, 1)), feed[1:]])
-        parts = Parts(natural**2, delta, beta, np.ones((self.n, 1)))
+        parts = BatchParts(natural**2, delta, beta, np.ones((self.n, 1)))
         return march(parts, force, lam, self.sweep.omega, near=self.sweep.phasor.T)
 
-    def slopes(self, x: Floats, motion: Motion) -> Complexes:
+    def slopes(self, x: Floats, motion: BatchMotion) -> Complexes:
         """Derivatives of the phasors; complex128, shape (n, 4n, S)."""
         here, omega = motion.phasor, self.sweep.omega
         own = np.zeros((self.n, EACH * self.n, len(omega)), dtype=np.complex128)
@@ -204,7 +204,7 @@ class _Fit:
             own[m, first + 3] = self.sweep.volts if m == 0 else here[m - 1] - here[m]
         return motion.tangent(own)
 
-    def off(self, motion: Motion) -> Complexes:
+    def off(self, motion: BatchMotion) -> Complexes:
         """Phasors of the fit minus those measured; complex128, shape (S, n)."""
         return np.asarray(motion.phasor.T - self.sweep.phasor)
 
@@ -248,21 +248,21 @@ class _Fit:
                 damping = max(damping, FIRST_DAMPING) / EASE
         return x, False
 
-    def _cost(self, motion: Motion, noise: Floats, points: Mask, robust: bool) -> tuple[float, Floats]:
+    def _cost(self, motion: BatchMotion, noise: Floats, points: Mask, robust: bool) -> tuple[float, Floats]:
         """The cost, infinite where there is no answer, and the residuals."""
         rest = _stacked((self.off(motion) / noise)[None], points)[0]
         cost = np.sum(2 * (np.sqrt(1 + rest**2) - 1) if robust else rest**2)
         return float(cost) if np.isfinite(cost) else np.inf, rest
 
     def _bends(
-        self, x: Floats, motion: Motion, rest: Floats, noise: Floats, points: Mask, robust: bool
+        self, x: Floats, motion: BatchMotion, rest: Floats, noise: Floats, points: Mask, robust: bool
     ) -> tuple[Floats, Floats]:
         """Half of the cost's gradient and of its second derivatives (Gauss and Newton's)."""
         slopes = self.jacobian(x, motion, noise, points)
         weighed = slopes / np.sqrt(1 + rest**2) if robust else slopes
         return weighed @ rest, weighed @ slopes.T
 
-    def jacobian(self, x: Floats, motion: Motion, noise: Floats, points: Mask) -> Floats:
+    def jacobian(self, x: Floats, motion: BatchMotion, noise: Floats, points: Mask) -> Floats:
         """Derivatives of the residuals of `points`, in standard deviations; shape (4n, 2 points).
 
         A point just at a fold has none, and counts as if it stood still.

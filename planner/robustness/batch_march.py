@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Motion", "Parts", "march"]
+__all__ = ["BatchMotion", "BatchParts", "march"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -17,7 +17,7 @@ FLAT = 1e-6
 
 
 @dataclass(frozen=True)
-class Parts:
+class BatchParts:
     """What the oscillators of a batch of chains are made of, dimensionless.
 
     Attributes
@@ -35,7 +35,7 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Motion:
+class BatchMotion:
     """What a batch of chains does.
 
     Attributes
@@ -73,7 +73,9 @@ class Motion:
         return out
 
 
-def march(parts: Parts, force: Complexes, lam: Floats, omega: Floats | float, near: Complexes | None = None) -> Motion:
+def march(
+    parts: BatchParts, force: Complexes, lam: Floats, omega: Floats | float, near: Complexes | None = None
+) -> BatchMotion:
     """The motion of every chain of a batch.
 
     ``(k_m + lam_m - omega^2 + (3/4) beta_m |A_m|^2 + i delta_m omega) A_m = f_m + lam_m A_{m-1}``, or for omega = 0
@@ -105,7 +107,7 @@ def march(parts: Parts, force: Complexes, lam: Floats, omega: Floats | float, ne
         mirror[m] = cubic[m] * phasor[m] ** 2
     phasor.flags.writeable = False
     escaped = np.any((parts.beta < 0) & (np.abs(phasor) ** 2 * -parts.beta >= stiff), axis=0)
-    return Motion(phasor, escaped, np.broadcast_to(links, (size[0], *links.shape[1:])), direct, mirror)
+    return BatchMotion(phasor, escaped, np.broadcast_to(links, (size[0], *links.shape[1:])), direct, mirror)
 
 
 def _amplitude2(linear: Complexes, cubic: Floats, push: Floats, near: tuple[Complexes, Complexes] | None) -> Floats:

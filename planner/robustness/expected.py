@@ -11,24 +11,23 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..closed_forms.links import drive_for, links_for
-from ..closed_forms.wave_fit import Hold
-from ..held import Held
 from ..margins import converter_error
+from ..operating_point import OperatingPoint
 from ..outlook import FrameSpread, TradePoint
-from ..plan import ChainState
-from .batch_march import Parts, march
+from ..targets import AmplitudeTarget, ChainTarget
+from .batch_march import BatchParts, march
 from .spread import (
     THRESHOLD,
     TOLERANCE,
+    FrameTarget,
     SpreadReport,
-    Wish,
     centre_of,
     draw,
     drawn_in,
+    frame_target,
     judge,
     known_spread,
     motion_of,
-    wish_of,
 )
 from .tone_march import march_tones
 
@@ -54,12 +53,14 @@ def expected_of(device: Device, amplitude: Floats, epsilon: Floats, lam: Floats,
     amplitude : float64, shape (P, n), wished, dimensionless. epsilon : (P,). lam : (P, n-1).
     """
     parts = draw(device.chain_length, count=FEW, seed=SEED).parts(device.chain, known_spread(device))
-    wishes = [Wish((one[None] / device.full_scale).astype(np.complex128), device.full_scale) for one in amplitude]
+    wishes = [
+        FrameTarget((one[None] / device.full_scale).astype(np.complex128), device.full_scale) for one in amplitude
+    ]
     held = zip(wishes, epsilon.tolist(), lam, strict=True)
     return float(np.mean([_report(wish, parts, drive, links, omega).expected for wish, drive, links in held]))
 
 
-def _report(wish: Wish, parts: Parts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
+def _report(wish: FrameTarget, parts: BatchParts, epsilon: float, lam: Floats, omega: float) -> SpreadReport:
     """Settings of one chain under drawn parts."""
     force = np.zeros((len(lam) + 1, 1, 1), dtype=np.complex128)
     force[0] = epsilon
@@ -89,24 +90,24 @@ class Expectation:
 
     def __init__(self, device: Device) -> None:
         self._device, self._spread = device, known_spread(device)
-        self._kept: dict[tuple[int, Held, float], _Drawn] = {}
+        self._kept: dict[tuple[int, ChainTarget, float], _Drawn] = {}
         self._traded: dict[tuple[int, bytes], tuple[TradePoint, ...]] = {}
-        self._frames: dict[tuple[Held, ...], FrameSpread | None] = {}
+        self._frames: dict[tuple[ChainTarget, ...], FrameSpread | None] = {}
 
-    def of(self, held: Sequence[Held], states: Sequence[ChainState]) -> FrameSpread | None:
+    def of(self, targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> FrameSpread | None:
         """A frame that is made as planned, chain by chain; None where nothing moves."""
-        key = tuple(held)
+        key = tuple(targets)
         if key not in self._frames:
             if len(self._frames) >= MOST_KEPT:
                 self._frames.clear()
-            self._frames[key] = self._made(held, states)
+            self._frames[key] = self._made(targets, states)
         return self._frames[key]
 
-    def _made(self, held: Sequence[Held], states: Sequence[ChainState]) -> FrameSpread | None:
+    def _made(self, targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> FrameSpread | None:
         busy = [i for i, state in enumerate(states) if state.moving or np.any(state.bias) or np.any(state.target)]
         if not busy:
             return None
-        drawn, worst = self._all(busy, held, states, 1.0), self._worst(busy, held, states)
+        drawn, worst = self._all(busy, targets, states, 1.0), self._worst(busy, targets, states)
         spread, error = self._spread, drawn.error
         return FrameSpread(
             spread=(spread.f0, spread.delta, spread.beta, spread.lam),
@@ -118,13 +119,15 @@ class Expectation:
             tolerance=TOLERANCE,
             wanted=WANTED,
             draws=DRAWS,
-            needed=self._needed(busy, held, states, drawn.yield_),
-            aim=max(float(np.abs(_wish(held[i], states[i]) - states[i].target).max()) for i in busy),
-            worst=None if worst is None else self._planned(worst, held[worst], states[worst]),
-            trade=() if worst is None else self._trade(worst, _wish(held[worst], states[worst])),
+            needed=self._needed(busy, targets, states, drawn.yield_),
+            aim=max(float(np.abs(_wanted(targets[i], states[i]) - states[i].target).max()) for i in busy),
+            worst=None if worst is None else self._planned(worst, targets[worst], states[worst]),
+            trade=() if worst is None else self._trade(worst, _wanted(targets[worst], states[worst])),
         )
 
-    def _needed(self, busy: list[int], held: Sequence[Held], states: Sequence[ChainState], now: float) -> float:
+    def _needed(
+        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], now: float
+    ) -> float:
         """The part of the spread at which the wanted yield is reached, between those tried.
 
         A plan for so much less spread need not aim beside the wish: it is taken to hold that exactly.
@@ -132,10 +135,10 @@ class Expectation:
         if now >= WANTED:
             return 1.0
         factors, yields = [1.0, *FACTORS.tolist()], {0: now}
-        states = [self._exact(i, held[i], state) for i, state in enumerate(states)]
+        states = [self._exact(i, targets[i], state) for i, state in enumerate(states)]
 
         def reached(k: int) -> bool:
-            yields[k] = self._all(busy, held, states, factors[k]).yield_
+            yields[k] = self._all(busy, targets, states, factors[k]).yield_
             return yields[k] >= WANTED
 
         bad, good = 0, len(factors) - 1
@@ -147,9 +150,9 @@ class Expectation:
         share = (WANTED - yields[bad]) / (yields[good] - yields[bad])
         return float(factors[bad] * (factors[good] / factors[bad]) ** share)
 
-    def _exact(self, i: int, held: Held, state: ChainState) -> ChainState:
+    def _exact(self, i: int, target: ChainTarget, state: OperatingPoint) -> OperatingPoint:
         """A state that aims beside its wish, as it would be if it did not."""
-        wish, device = _wish(held, state), self._device
+        wish, device = _wanted(target, state), self._device
         if np.array_equal(wish, state.target):
             return state
         place = self._place(i)
@@ -158,30 +161,36 @@ class Expectation:
         lam = links_for(chain, amplitude, state.omega) / device.lam_gain(*place)
         return replace(state, epsilon=complex(epsilon), lam=lam, target=wish)
 
-    def _all(self, busy: list[int], held: Sequence[Held], states: Sequence[ChainState], factor: float) -> _Drawn:
+    def _all(
+        self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], factor: float
+    ) -> _Drawn:
         """All chains of a frame; those with phases together, because a phase they share makes no difference."""
         phased = [i for i in busy if states[i].phase is not None]
-        found = [self._judged(phased, held, states, factor)] if phased else []
+        found = [self._judged(phased, targets, states, factor)] if phased else []
         for i in busy:
             if i not in phased:
-                key = (i, held[i], factor)
+                key = (i, targets[i], factor)
                 if key not in self._kept:
                     if len(self._kept) >= MOST_KEPT * len(FACTORS):
                         self._kept.clear()
-                    self._kept[key] = self._judged([i], held, states, factor)
+                    self._kept[key] = self._judged([i], targets, states, factor)
                 found.append(self._kept[key])
         return _Drawn(np.max([one.error for one in found], axis=0), np.all([one.right for one in found], axis=0))
 
-    def _judged(self, places: list[int], held: Sequence[Held], states: Sequence[ChainState], factor: float) -> _Drawn:
+    def _judged(
+        self, places: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint], factor: float
+    ) -> _Drawn:
         device = self._device
-        there = [replace(states[i], target=_wish(held[i], states[i])) for i in places]
+        there = [replace(states[i], target=_wanted(targets[i], states[i])) for i in places]
         set_to = [_as_driven(state, self._drive_gain(i)) for i, state in zip(places, there, strict=True)]
         parts = drawn_in(device, self._spread.scaled(factor), places, count=DRAWS, seed=SEED)
         if there[0].tones:
             return _toned(device, set_to[0], parts)
         ring = None if device.coupling.closure is Closure.OPEN else centre_of(device, places)
-        report = judge(wish_of(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD)
-        noise = max(converter_error(device, Hold(one.epsilon, one.lam, one.omega)) for one in there)
+        report = judge(
+            frame_target(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD
+        )
+        noise = max(converter_error(device, one) for one in there)
         return _Drawn((report.error + noise / device.full_scale).astype(np.float32), report.right)
 
     def _place(self, i: int) -> tuple[int, int]:
@@ -191,16 +200,16 @@ class Expectation:
     def _drive_gain(self, i: int) -> float:
         return self._device.drive_per_volt(*self._place(i)) / self._device.epsilon_per_volt
 
-    def _worst(self, busy: list[int], held: Sequence[Held], states: Sequence[ChainState]) -> int | None:
+    def _worst(self, busy: list[int], targets: Sequence[ChainTarget], states: Sequence[OperatingPoint]) -> int | None:
         """Of the chains whose settings have a closed form, that with the largest expected error."""
         device = self._device
         if device.coupling.scope != "link" and device.chain_length > 1:
             return None
         plain = [i for i in busy if states[i].epsilon and states[i].phase is None and not states[i].tones]
-        return max(plain, key=lambda i: float(self._kept[(i, held[i], 1.0)].error.mean()), default=None)
+        return max(plain, key=lambda i: float(self._kept[(i, targets[i], 1.0)].error.mean()), default=None)
 
-    def _planned(self, i: int, held: Held, state: ChainState) -> TradePoint:
-        drawn = self._kept[(i, held, 1.0)]
+    def _planned(self, i: int, target: ChainTarget, state: OperatingPoint) -> TradePoint:
+        drawn = self._kept[(i, target, 1.0)]
         volts = abs(state.epsilon) / self._device.epsilon_max
         expected, median = float(drawn.error.mean()), float(np.median(drawn.error))
         return TradePoint(state.omega, volts, expected, median, drawn.yield_)
@@ -217,7 +226,7 @@ class Expectation:
     def _over_the_band(self, i: int, target: Floats) -> tuple[TradePoint, ...]:
         device, place = self._device, self._place(i)
         chain, parts = device.chain_at(*place), drawn_in(device, self._spread, [i], count=DRAWS, seed=SEED)
-        amplitude, wish = target * device.full_scale, Wish(target[None].astype(np.complex128), device.full_scale)
+        amplitude, wish = target * device.full_scale, FrameTarget(target[None].astype(np.complex128), device.full_scale)
         most = device.amplifier.volts * device.drive_per_volt(*place)
         points = []
         for omega in np.linspace(device.omega.min, device.omega.max, TRADED).tolist():
@@ -228,9 +237,9 @@ class Expectation:
         return tuple(points)
 
 
-def _toned(device: Device, state: ChainState, parts: Parts) -> _Drawn:
+def _toned(device: Device, state: OperatingPoint, parts: BatchParts) -> _Drawn:
     """One chain of several tones, each of which is to make its part of the amplitude."""
-    flat = Parts(*(getattr(parts, field.name)[:, 0] for field in fields(Parts)))
+    flat = BatchParts(*(getattr(parts, field.name)[:, 0] for field in fields(BatchParts)))
     motion = march_tones(state, flat)
     levels = np.abs(motion.phasor[motion.wanted]) / device.full_scale
     target = state.target[:, None]
@@ -241,14 +250,12 @@ def _toned(device: Device, state: ChainState, parts: Parts) -> _Drawn:
     return _Drawn(error.astype(np.float32), right)
 
 
-def _wish(held: Held, state: ChainState) -> Floats:
-    """The amplitudes wished for: those of the key, where a plan may aim beside them, else the state's."""
-    if held.key and len(held.key) == 8 * len(state.target):
-        return np.frombuffer(held.key)
-    return state.target
+def _wanted(target: ChainTarget, state: OperatingPoint) -> Floats:
+    """The amplitudes wanted: those of the target, where a plan may aim beside them, else the state's."""
+    return target.levels if isinstance(target, AmplitudeTarget) else state.target
 
 
-def _as_driven(state: ChainState, gain: float) -> ChainState:
+def _as_driven(state: OperatingPoint, gain: float) -> OperatingPoint:
     """A state whose drive is what its actuator makes of it."""
     if gain == 1.0:
         return state

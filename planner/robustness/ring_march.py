@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .batch_march import Motion, Parts
+from .batch_march import BatchMotion, BatchParts
 
 __all__ = ["march_ring"]
 
@@ -18,7 +18,9 @@ STEPS, NEWTON = 8, 6
 MET = 1e-8
 
 
-def march_ring(parts: Parts, centre: Parts, force: Complexes, lam: Floats, omega: Floats, near: Complexes) -> Motion:
+def march_ring(
+    parts: BatchParts, centre: BatchParts, force: Complexes, lam: Floats, omega: Floats, near: Complexes
+) -> BatchMotion:
     """The motion of every ring of a batch on the branch of the one they are drawn around.
 
     ``(k_m + lam_m - omega^2 + (3/4) beta_m |A_m|^2 + i delta_m omega) A_m = f_m + lam_m A_{m-1}``, the first after the
@@ -29,14 +31,14 @@ def march_ring(parts: Parts, centre: Parts, force: Complexes, lam: Floats, omega
     ----------
     parts : the rings; centre : those they are drawn around, which broadcast against them.
     force, lam, omega : as in `march`; the first lam closes the ring. near : complex128, shape (n, ...), the motion of
-        `centre` under them. `Motion.tangent` of the answer is NaN.
+        `centre` under them. `BatchMotion.tangent` of the answer is NaN.
     """
     size = np.broadcast_shapes(parts.stiffness.shape, force.shape, np.shape(omega))
     phasor = np.array(np.broadcast_to(near, size), dtype=np.complex128)
     scale = np.abs(force).max(axis=0) + 1e-300
     for step in range(1, STEPS + 1):
         share = step / STEPS
-        here = Parts(*((1 - share) * getattr(centre, name) + share * getattr(parts, name) for name in _NAMES))
+        here = BatchParts(*((1 - share) * getattr(centre, name) + share * getattr(parts, name) for name in _NAMES))
         for _ in range(NEWTON):
             left, solved = _newton(here, force, lam, omega, phasor)
             with np.errstate(invalid="ignore", over="ignore"):
@@ -49,14 +51,14 @@ def march_ring(parts: Parts, centre: Parts, force: Complexes, lam: Floats, omega
     phasor = np.where(lost, 0.0, phasor)
     phasor.flags.writeable = False
     unknown = np.full(size, np.nan + 0j)
-    return Motion(phasor, lost, np.broadcast_to(links, size), unknown, unknown)
+    return BatchMotion(phasor, lost, np.broadcast_to(links, size), unknown, unknown)
 
 
 _NAMES = ("stiffness", "delta", "beta", "lam_gain")
 
 
 def _newton(
-    parts: Parts, force: Complexes, lam: Floats, omega: Floats, phasor: Complexes
+    parts: BatchParts, force: Complexes, lam: Floats, omega: Floats, phasor: Complexes
 ) -> tuple[Complexes, Complexes]:
     """What is left of the forces, and the step that removes it to first order, both of the shape of `phasor`.
 

@@ -11,19 +11,17 @@ from chainsim import Device
 
 from ..closed_forms.links import drive_for, links_for
 from ..errors import PlanError
-from ..plan import ChainState
-from .robust_search import Held, Search, TradeRow, Trial
-from .spread import Spread
+from ..operating_point import OperatingPoint
+from .robust_search import RobustSearch, TradeRow, Trial
+from .spread import RelativeSpread
 
 __all__ = [
     "Accuracy",
-    "Held",
     "RobustError",
     "RobustPlan",
     "TradeRow",
     "Trial",
     "accuracy_needed",
-    "hold",
     "robust_plan",
 ]
 
@@ -67,7 +65,7 @@ class RobustPlan:
 def _line(row: TradeRow) -> str:
     report = row.report
     return (
-        f"{row.held.omega:8.4f} {row.volts:7.1%} {row.nominal_error:8.4f} {report.expected:9.4f} "
+        f"{row.point.omega:8.4f} {row.volts:7.1%} {row.nominal_error:8.4f} {report.expected:9.4f} "
         f"{report.median:8.4f} {report.quantile(0.9):8.4f} {report.yield_:7.1%}"
     )
 
@@ -84,16 +82,11 @@ class Accuracy:
     """
 
     factor: float
-    spread: Spread
+    spread: RelativeSpread
     row: TradeRow
 
 
-def hold(state: ChainState) -> Held:
-    """The setting of a planned state."""
-    return Held(abs(state.epsilon), state.lam, state.omega)
-
-
-def robust_plan(device: Device, trial: Trial, nominal: Held, *, well_share: float) -> RobustPlan:
+def robust_plan(device: Device, trial: Trial, nominal: OperatingPoint, *, well_share: float) -> RobustPlan:
     """Minimise the expected error over drive, links and frequency.
 
     The search starts at `nominal` and, where every link has its own lam, at the closed forms for frequencies over the
@@ -108,7 +101,7 @@ def robust_plan(device: Device, trial: Trial, nominal: Held, *, well_share: floa
     RobustError
         When `nominal` itself is beyond what the device can hold.
     """
-    search = Search(device, trial, trial.spread)
+    search = RobustSearch(device, trial, trial.spread)
     given = search.row(nominal)
     if not search.fits(nominal) or given.well > well_share:
         raise RobustError(
@@ -119,12 +112,12 @@ def robust_plan(device: Device, trial: Trial, nominal: Held, *, well_share: floa
     trade = [search.row(search.least(start, free_omega=False)) for start in starts if search.fits(start)]
     allowed = [row for row in (given, *trade) if row.well <= well_share]
     best = min(allowed, key=lambda row: row.report.expected)
-    last = [search.row(search.least(row.held, free_omega=True)) for row in {id(r): r for r in (best, given)}.values()]
+    last = [search.row(search.least(row.point, free_omega=True)) for row in {id(r): r for r in (best, given)}.values()]
     robust = min([best, *(row for row in last if row.well <= well_share)], key=lambda row: row.report.expected)
     return RobustPlan(given, robust, tuple(trade))
 
 
-def _closed_forms(device: Device, trial: Trial) -> list[Held]:
+def _closed_forms(device: Device, trial: Trial) -> list[OperatingPoint]:
     """Nominal settings of the wish's amplitudes over the device's band."""
     amplitude = np.abs(trial.wish.amplitude[0]) * trial.wish.full_scale
     if not np.all(amplitude > 0):
@@ -133,11 +126,13 @@ def _closed_forms(device: Device, trial: Trial) -> list[Held]:
     for omega in np.linspace(device.omega.min, device.omega.max, OMEGAS):
         lam = links_for(trial.chain, amplitude, float(omega))
         if np.all(np.isfinite(lam)):
-            found.append(Held(float(drive_for(trial.chain, amplitude[:1], float(omega))[0]), lam, float(omega)))
+            found.append(
+                OperatingPoint(float(drive_for(trial.chain, amplitude[:1], float(omega))[0]), lam, float(omega))
+            )
     return found
 
 
-def accuracy_needed(device: Device, trial: Trial, nominal: Held, *, share: float) -> Accuracy:
+def accuracy_needed(device: Device, trial: Trial, nominal: OperatingPoint, *, share: float) -> Accuracy:
     """The largest part of the spread under which `share` of the draws make the pattern, by bisection.
 
     Each part of the spread has its own least expected error, searched for from `nominal` at its frequency.
@@ -157,8 +152,8 @@ def accuracy_needed(device: Device, trial: Trial, nominal: Held, *, share: float
     return Accuracy(good, trial.spread.scaled(good), found)
 
 
-def _best(device: Device, trial: Trial, factor: float, nominal: Held) -> TradeRow:
+def _best(device: Device, trial: Trial, factor: float, nominal: OperatingPoint) -> TradeRow:
     """Of `nominal` and the setting with the least expected error near it, the one with the greater yield."""
-    search = Search(device, trial, trial.spread.scaled(factor))
+    search = RobustSearch(device, trial, trial.spread.scaled(factor))
     rows = [search.row(nominal), search.row(search.least(nominal, free_omega=False))]
     return max(rows, key=lambda row: row.report.yield_)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device, Outcome, Setting, solve
+from chainsim import Device, Outcome, solve
 
 from ..closed_forms.links import drive_for, links_for
 from ..margins import WELL_SHARE
-from .robust_search import Held, Search, TradeRow, Trial
-from .spread import THRESHOLD, TOLERANCE, Wish, known_spread
+from ..operating_point import OperatingPoint, setting_of
+from .robust_search import RobustSearch, TradeRow, Trial
+from .spread import THRESHOLD, TOLERANCE, FrameTarget, known_spread
 
 __all__ = ["aim_for"]
 
@@ -41,45 +42,44 @@ def aim_for(device: Device, target: Floats, omega: float, chains: int) -> Floats
     float64, shape (n,), in units of full scale.
     """
     chain, wanted = device.chain, target * device.full_scale
-    wish = Wish(target[None].astype(np.complex128), device.full_scale)
+    wish = FrameTarget(target[None].astype(np.complex128), device.full_scale)
     trial = Trial(chain, wish, known_spread(device), TOLERANCE, THRESHOLD, JUDGED, SEED)
-    search = Search(device, trial, trial.spread, min(chains, MOST_COPIES))
-    nominal = Held(float(drive_for(chain, wanted[:1], omega)[0]), links_for(chain, wanted, omega), omega)
+    search = RobustSearch(device, trial, trial.spread, min(chains, MOST_COPIES))
+    nominal = OperatingPoint(float(drive_for(chain, wanted[:1], omega)[0]), links_for(chain, wanted, omega), omega)
     if not search.fits(nominal):
         return target
     found = [nominal, search.least(nominal, free_omega=False)]
     if device.coupling.lam_step and len(nominal.lam):
-        found = [search.least(_settable(search, held), free_omega=False, free_lam=False) for held in found]
+        found = [search.least(_settable(search, one), free_omega=False, free_lam=False) for one in found]
     best = min(filter(_safe, map(search.row, found)), key=lambda row: search.worst_of(row.report.error), default=None)
-    if best is None or best.held is nominal:
+    if best is None or best.point is nominal:
         return target
-    return _standing(device, best.held, target)
+    return _standing(device, best.point, target)
 
 
 def _safe(row: TradeRow) -> bool:
     return row.well <= WELL_SHARE and row.volts <= 1
 
 
-def _settable(search: Search, held: Held) -> Held:
+def _settable(search: RobustSearch, point: OperatingPoint) -> OperatingPoint:
     """With the nearest links that can be set."""
     coupling, gain = search.device.coupling, search.gain
-    steps = np.rint((held.lam / gain - coupling.lam.min) / coupling.lam_step)
+    steps = np.rint((point.lam / gain - coupling.lam.min) / coupling.lam_step)
     # A link of 0 passes nothing on.
     least = 0 if coupling.lam.min > 0 else 1
     steps = np.clip(steps, least, 2 ** (coupling.bits or 1) - 1)
-    return replace(held, lam=(coupling.lam.min + coupling.lam_step * steps) * gain)
+    return replace(point, lam=(coupling.lam.min + coupling.lam_step * steps) * gain)
 
 
-def _standing(device: Device, held: Held, target: Floats) -> Floats:
+def _standing(device: Device, point: OperatingPoint, target: Floats) -> Floats:
     """What settings hold, by harmonic balance; `target` where that is not known, not it, or no way leads there."""
-    setting = Setting.of(device.chain, epsilon=held.epsilon, lam=held.lam if len(held.lam) else 0.0, omega=held.omega)
-    response = solve(device.chain, setting, tol=TOL, rung="harmonic_balance", start="rest")
+    response = solve(device.chain, setting_of(device.chain, [point]), tol=TOL, rung="harmonic_balance", start="rest")
     if response.outcome[0] is not Outcome.OK or not response.stable[0]:
         return target
     amplitude = np.abs(response.phasor[0])
     # Ways in are planned for the links of the closed form: these must be the same ones.
-    again = links_for(device.chain, amplitude, held.omega)
-    same = bool(np.all(np.abs(again - held.lam) <= 0.05 * held.lam))
+    again = links_for(device.chain, amplitude, point.omega)
+    same = bool(np.all(np.abs(again - point.lam) <= 0.05 * point.lam))
     aim = np.asarray(amplitude / device.full_scale)
     # Where spread is hopeless the least error is that of amplitudes in between, which are no dots any more.
     dots = np.array_equal(aim >= THRESHOLD, target >= THRESHOLD)

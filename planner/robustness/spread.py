@@ -12,25 +12,25 @@ from numpy.typing import NDArray
 from chainsim import Chain, Closure, Device
 
 from ..errors import PlanError
-from ..plan import ChainState
-from .batch_march import Motion, Parts, march
+from ..operating_point import OperatingPoint
+from .batch_march import BatchMotion, BatchParts, march
 
 __all__ = [
     "THRESHOLD",
     "TOLERANCE",
     "Draws",
-    "Spread",
+    "FrameTarget",
+    "RelativeSpread",
     "SpreadError",
     "SpreadReport",
-    "Wish",
     "centre_of",
     "draw",
     "drawn_in",
+    "frame_target",
     "judge",
     "known_spread",
     "motion_of",
     "spread_of",
-    "wish_of",
 ]
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ class SpreadError(PlanError, ValueError):
 
 
 @dataclass(frozen=True)
-class Spread:
+class RelativeSpread:
     """Standard deviations from actuator to actuator, each relative to the nominal value; independent and normal.
 
     f0 : natural frequency. delta : damping. beta : cubic term. lam : what a link makes of the lam it is set to.
@@ -72,15 +72,15 @@ class Spread:
             if not (np.isfinite(value) and value >= 0):
                 raise SpreadError(f"spread.{name}: expected a relative standard deviation >= 0, got {value}")
 
-    def scaled(self, factor: float) -> Spread:
+    def scaled(self, factor: float) -> RelativeSpread:
         """All four times `factor`."""
-        return Spread(self.f0 * factor, self.delta * factor, self.beta * factor, self.lam * factor)
+        return RelativeSpread(self.f0 * factor, self.delta * factor, self.beta * factor, self.lam * factor)
 
 
-def known_spread(device: Device) -> Spread:
+def known_spread(device: Device) -> RelativeSpread:
     """What the profile says of its actuators' spread; none where it says nothing."""
     told = device.spread
-    return Spread() if told is None else Spread(told.frequency, told.damping, told.beta, told.lam)
+    return RelativeSpread() if told is None else RelativeSpread(told.frequency, told.damping, told.beta, told.lam)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Draws:
 
     normal: Floats
 
-    def parts(self, chain: Chain, spread: Spread, gain: Floats | None = None) -> Parts:
+    def parts(self, chain: Chain, spread: RelativeSpread, gain: Floats | None = None) -> BatchParts:
         """The chains drawn, around the numbers of `chain`: arrays of shape (n, chains, count).
 
         `gain` : float64, shape (n-1,), what links make of the lam they are set to, where that is known.
@@ -108,7 +108,7 @@ class Draws:
         if chain.closure is Closure.BIDIRECTIONAL or chain.rows > 1:
             raise SpreadError(f"spread: expected an open chain or a ring, got {chain.closure} with {chain.rows} rows")
         f0, delta, beta, lam = self.normal
-        return Parts(
+        return BatchParts(
             stiffness=_column(chain.stiffness) * _positive(1 + spread.f0 * f0) ** 2,
             delta=_column(chain.deltas) * _positive(1 + spread.delta * delta),
             beta=_column(chain.betas) * (1 + spread.beta * beta),
@@ -138,7 +138,7 @@ def _normal(n: int, count: int, seed: int | tuple[int, ...], chains: int) -> Flo
 
 
 @dataclass(frozen=True)
-class Wish:
+class FrameTarget:
     """What the chains of a frame are to make felt.
 
     Attributes
@@ -242,7 +242,7 @@ class SpreadReport:
         return float(np.quantile(self.error, share))
 
 
-def judge(wish: Wish, motion: Motion, *, tolerance: float, threshold: float) -> SpreadReport:
+def judge(wish: FrameTarget, motion: BatchMotion, *, tolerance: float, threshold: float) -> SpreadReport:
     """Compare motions of shape (n, chains, count) with a wish; `threshold` parts dots from no dots."""
     deviation = wish.deviation(motion.phasor)
     wanted = np.abs(wish.amplitude.T[:, :, None]) >= threshold
@@ -255,16 +255,16 @@ def judge(wish: Wish, motion: Motion, *, tolerance: float, threshold: float) -> 
     return SpreadReport(error, right, tolerance)
 
 
-def wish_of(device: Device, states: Sequence[ChainState]) -> Wish:
+def frame_target(device: Device, states: Sequence[OperatingPoint]) -> FrameTarget:
     """What planned states were planned for; chains at one frequency share their phase."""
     target = np.array([state.target for state in states])
     phase = np.array([np.full(len(state.target), np.nan) if state.phase is None else state.phase for state in states])
     matters = np.isfinite(phase)
     _, group = np.unique([state.omega for state in states], return_inverse=True)
-    return Wish(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
+    return FrameTarget(target * np.exp(1j * np.where(matters, phase, 0.0)), device.full_scale, matters, group=group)
 
 
-def motion_of(states: Sequence[ChainState], parts: Parts, ring: Parts | None = None) -> Motion:
+def motion_of(states: Sequence[OperatingPoint], parts: BatchParts, ring: BatchParts | None = None) -> BatchMotion:
     """What chains do when each holds its state: `parts` of shape (n, chains, count).
 
     `ring` : where they are rings, the ones they are drawn around, of shape (n, chains, 1).
@@ -297,12 +297,12 @@ def motion_of(states: Sequence[ChainState], parts: Parts, ring: Parts | None = N
     return march_ring(parts, ring, force, lam, omega, near)
 
 
-def centre_of(device: Device, places: Sequence[int]) -> Parts:
+def centre_of(device: Device, places: Sequence[int]) -> BatchParts:
     """Chains as they are known, without what spread makes of them; arrays of shape (n, places, 1)."""
-    return drawn_in(device, Spread(), places, count=1, seed=0)
+    return drawn_in(device, RelativeSpread(), places, count=1, seed=0)
 
 
-def drawn_in(device: Device, spread: Spread, places: Sequence[int], *, count: int, seed: int) -> Parts:
+def drawn_in(device: Device, spread: RelativeSpread, places: Sequence[int], *, count: int, seed: int) -> BatchParts:
     """Chains drawn in their places, row by row, chain by chain; arrays of shape (n, places, count).
 
     A place has its own stream of the seed, so that its draws do not depend on the other places asked for.
@@ -312,13 +312,15 @@ def drawn_in(device: Device, spread: Spread, places: Sequence[int], *, count: in
         place = divmod(i, device.chains_per_row)
         draws = draw(device.chain_length, count=count, seed=(seed, i))
         found.append(draws.parts(device.chain_at(*place), spread, device.lam_gain(*place)))
-    return Parts(*(np.concatenate([getattr(one, field.name) for one in found], axis=1) for field in fields(Parts)))
+    return BatchParts(
+        *(np.concatenate([getattr(one, field.name) for one in found], axis=1) for field in fields(BatchParts))
+    )
 
 
 def spread_of(
     device: Device,
-    states: Sequence[ChainState],
-    spread: Spread,
+    states: Sequence[OperatingPoint],
+    spread: RelativeSpread,
     *,
     tolerance: float,
     threshold: float,
@@ -338,9 +340,11 @@ def spread_of(
     SpreadError
         For states as in `motion_of`.
     """
-    wish = wish_of(device, states)
+    wish = frame_target(device, states)
     parts = draw(device.chain_length, count=count, seed=seed, chains=len(states)).parts(device.chain, spread)
     ring = (
-        None if device.chain.feed_forward else draw(device.chain_length, count=1, seed=0).parts(device.chain, Spread())
+        None
+        if device.chain.feed_forward
+        else draw(device.chain_length, count=1, seed=0).parts(device.chain, RelativeSpread())
     )
     return judge(wish, motion_of(states, parts, ring), tolerance=tolerance, threshold=threshold)

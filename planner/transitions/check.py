@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..drive import FirstOrderHold, cubic, cubic_slope, felt, full_motion, smooth_step
+
 __all__ = ["Orbit", "Passage", "Way", "travel"]
 
 Floats = NDArray[np.float64]
@@ -39,16 +41,8 @@ class Way:
 
     def drive(self, tau: Floats) -> tuple[Complexes, Complexes]:
         """Envelope and its derivative at instants `tau`."""
-        at = np.minimum(tau, self.tau[-1])
-        k = np.clip(np.searchsorted(self.tau, at, side="right") - 1, 0, len(self.tau) - 2)
-        width = np.diff(self.tau)[k]
-        s = (at - self.tau[k]) / width
-        rise = np.diff(self.epsilon)[k]
-        begin, end = width * self.epsilon_slope[k], width * self.epsilon_slope[k + 1]
-        square, cube = 3 * rise - 2 * begin - end, begin + end - 2 * rise
-        value = self.epsilon[k] + s * (begin + s * (square + s * cube))
-        slope = (begin + s * (2 * square + 3 * s * cube)) / width
-        return value, np.where(tau < self.tau[-1], slope, 0.0)
+        nodes = self.tau, self.epsilon, self.epsilon_slope
+        return cubic(tau, *nodes), cubic_slope(tau, *nodes)
 
     def then(self, other: Way) -> Way:
         """This way and another behind it, which begins where this one ends."""
@@ -99,7 +93,9 @@ class Orbit:
         count = PRELUDE * SAMPLES_PER_PERIOD
         length = count * dtau
         x = np.arange(count) / count
-        step, slope, bend = x**3 * (10 - 15 * x + 6 * x**2), 30 * (x * (1 - x)) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
+        step, _, bend = smooth_step(x)
+        # Multiplied in this order: what a stop magnifies is the last digit too.
+        slope = 30 * (x * (1 - x)) ** 2
         rate = 1j * self.omega * np.arange(1, len(self.harmonics) + 1)
         turning = np.exp(rate * (x[:, None] - 1) * length + rate / self.omega * phase)
         z, v, a = ((turning * rate**k @ self.harmonics).real for k in range(3))
@@ -133,35 +129,16 @@ def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: i
     ----------
     phases : of the carrier when the way begins, and of the orbit, radians; all are followed side by side.
     """
-    from chainsim import GridIntegrator
-
-    dtau, count = 2 * math.pi / omega / SAMPLES_PER_PERIOD, len(phases)
+    dtau = 2 * math.pi / omega / SAMPLES_PER_PERIOD
     steps = math.ceil(float(way.tau[-1]) / dtau)
     tau = dtau * np.arange(steps + periods * SAMPLES_PER_PERIOD, dtype=np.float64)
     carrier = np.exp(1j * np.add.outer(omega * tau, phases))
-    pass_by, tilt = _hold(omega, dtau)
-    value, slope = way.drive(tau)
-    force = np.zeros((len(tau), count, chain.n))
-    force[:, :, 0] = ((value / pass_by + 1j * slope * tilt / pass_by**2)[:, None] * carrier).real
-    lam = np.zeros_like(force)
-    lam[:, :, 1:] = way.links(tau)[:, None]
-    grid = GridIntegrator(
-        shape=(count, chain.n), chain_length=chain.n, delta=chain.delta, beta=chain.beta, ring=False, dtau=dtau
-    )
+    envelope = FirstOrderHold.of(omega, dtau).raised(*way.drive(tau))
+    lam = np.pad(way.links(tau), ((0, 0), (1, 0)))[:, None]
+    before = None
     if start is not None:
-        before = np.stack([start.prelude(chain, dtau, phase) for phase in phases], axis=1)
-        links = np.broadcast_to(np.concatenate([[0.0], start.lam]), (count, chain.n))
-        grid.advance(before / _hold(start.omega, dtau)[0], links)
-    z = grid.advance(force, lam)
-    after = (z[steps:] * carrier[steps:, :, None].conj()).reshape(periods, SAMPLES_PER_PERIOD, count, chain.n)
-    return Passage(2 * after.mean(axis=1).transpose(1, 0, 2), float(np.abs(z).max()))
-
-
-def _hold(omega: float, dtau: float) -> tuple[float, float]:
-    """What straight lines between samples pass of a carrier, sinc^2 of half a sample's phase, and its derivative.
-
-    Undone by `travel`, or every stage would magnify the little that is lost.
-    """
-    half = omega * dtau / 2
-    sinc = math.sin(half) / half
-    return sinc**2, dtau * sinc * (half * math.cos(half) - math.sin(half)) / half**2
+        forces = np.stack([start.prelude(chain, dtau, phase) for phase in phases], axis=1)
+        before = forces / FirstOrderHold.of(start.omega, dtau).passed, np.concatenate([[0.0], start.lam])
+    z = full_motion(chain, dtau, (envelope[:, None] * carrier).real, lam, before=before)
+    after = felt(z[steps:], carrier[steps:, :, None], SAMPLES_PER_PERIOD)
+    return Passage(after.transpose(1, 0, 2), float(np.abs(z).max()))

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..drive import smooth_step
+from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way, travel
 from .limits import WayLimits, checked
 from .rise import orbit_of, ramp_of
-from .search import MET, MOST_PERIODS, STANDS, Search
-from .slow_flow import Course, follow_course
-from .steering import Standing, Steering, rest, smooth_step
+from .search import MET, MOST_PERIODS, STANDS, RampSearch
+from .slow_flow import DriveCourse, follow_course
+from .steering import Steering, rest
 
 __all__ = ["find_fall"]
 
@@ -51,7 +53,7 @@ def find_fall(
     Parameters, errors: as `find_way`.
     """
     held = checked(chain, epsilon, lam, omega, phasor, limits, tau_per_s)
-    orbit, lacking = orbit_of(chain, held, omega)
+    orbit, lacking = orbit_of(chain, held)
     if orbit is None or lacking:
         return ramp_of(_let_go(held, omega, limits, 0.0), limits, tau_per_s, lacking)
     stopped = _stopped(chain, held, orbit, omega, limits, tau_per_s, budget)
@@ -61,19 +63,21 @@ def find_fall(
 
 
 def _stopped(
-    chain: Chain, held: Standing, orbit: Orbit, omega: float, limits: WayLimits, tau_per_s: float, budget: int
+    chain: Chain, held: OperatingPoint, orbit: Orbit, omega: float, limits: WayLimits, tau_per_s: float, budget: int
 ) -> Way | None:
     """The shortest way found whose end is stopped by the drive."""
-    held = Standing(held.epsilon, held.lam, orbit.harmonics[0])
+    held = replace(held, phasor=orbit.harmonics[0])
     calm = CALM * float(np.abs(held.phasor).max())
-    found: list[tuple[Search, Steering, Floats]] = []
+    found: list[tuple[RampSearch, Steering, Floats]] = []
     longest = MOST_PERIODS * 2 * math.pi / omega
     spent, waits = 0, [min(efolds * 2 / max(chain.delta, 1e-9), longest) for efolds in WAITS]
     while waits:
         wait = waits.pop(0)
         ahead = _let_go(held, omega, limits, wait)
-        start = replace(rest(ahead.lam[-1]), phasor=_left(chain, held, omega, ahead))
-        search = Search(chain, start, rest(ahead.lam[-1]), omega, limits, tau_per_s, budget, orbit, ahead, spent)
+        start = replace(rest(ahead.lam[-1], omega), phasor=_left(chain, held, omega, ahead))
+        search = RampSearch(
+            chain, start, rest(ahead.lam[-1], omega), omega, limits, tau_per_s, budget, orbit, ahead, spent
+        )
         task = search.task(STOP * search.first_length)
         task = search.task(max(task.duration, INTERVAL * task.intervals / omega))
         unknowns = _after(search, task, found)
@@ -88,7 +92,7 @@ def _stopped(
     return None
 
 
-def _after(search: Search, task: Steering, found: list[tuple[Search, Steering, Floats]]) -> Floats | None:
+def _after(search: RampSearch, task: Steering, found: list[tuple[RampSearch, Steering, Floats]]) -> Floats | None:
     """The stop after less waiting from that after more: as much stronger and turned as what is to be stopped."""
     if not found:
         return search.from_nothing(task)
@@ -101,11 +105,11 @@ def _after(search: Search, task: Steering, found: list[tuple[Search, Steering, F
     return steered.unknowns if steered.missed <= MET else None
 
 
-def _let_go(held: Standing, omega: float, limits: WayLimits, wait: float) -> Way:
+def _let_go(held: OperatingPoint, omega: float, limits: WayLimits, wait: float) -> Way:
     """Drive and links taken away, and so long a wait (tau) after it."""
     length = 2 * math.pi / omega * PERIODS
     x = np.linspace(0.0, 1.0, 4 * PERIODS + 1)
-    step, slope = smooth_step(x)
+    step, slope, _ = smooth_step(x)
     open_to = held.lam if limits.lam_scope == "fixed" else np.full_like(held.lam, limits.lam_min)
     lam = held.lam + (open_to - held.lam) * step[:, None]
     drive, drive_slope = np.asarray(held.epsilon * (1 - step)), np.asarray(-held.epsilon * slope / length)
@@ -119,7 +123,7 @@ def _still(tau: Floats, lam: Floats) -> Way:
     return Way(tau, nothing, nothing, tau, np.repeat(lam[None, :], len(tau), axis=0))
 
 
-def _left(chain: Chain, held: Standing, omega: float, way: Way) -> Complexes:
+def _left(chain: Chain, held: OperatingPoint, omega: float, way: Way) -> Complexes:
     """Amplitudes at the end of a way on the slow flow."""
     duration = float(way.tau[-1])
     rate = abs(1 - omega**2) + chain.delta + float(held.lam.max(initial=0.0))
@@ -129,11 +133,11 @@ def _left(chain: Chain, held: Standing, omega: float, way: Way) -> Complexes:
     epsilon, epsilon_slope = way.drive(tau)
     lam = np.pad(way.links(tau), ((0, 0), (1, 0)))
     slope = np.gradient(lam, tau, axis=0)
-    course = Course(epsilon[:, None], epsilon_slope[:, None], lam, slope, np.zeros_like(lam))
+    course = DriveCourse(epsilon[:, None], epsilon_slope[:, None], lam, slope, np.zeros_like(lam))
     return np.asarray(follow_course(chain, omega, duration, course, held.phasor, 1.0)[-1, :, 0])
 
 
-def _died(chain: Chain, held: Standing, orbit: Orbit, limits: WayLimits, tau_per_s: float) -> Ramp:
+def _died(chain: Chain, held: OperatingPoint, orbit: Orbit, limits: WayLimits, tau_per_s: float) -> Ramp:
     """The way on which the motion dies away by itself."""
     omega, lacking = orbit.omega, ""
     way = _let_go(held, omega, limits, 0.0)

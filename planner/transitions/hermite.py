@@ -1,4 +1,4 @@
-"""Curves through values and slopes, and the best broken line through such a curve."""
+"""The best broken line through a curve that is given by values and slopes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drive import cubic
+
 __all__ = ["broken_line"]
 
 Floats = NDArray[np.float64]
@@ -15,18 +17,6 @@ Floats = NDArray[np.float64]
 # Four-point Gauss-Legendre rule on [0, 1].
 _ABSCISSAE, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _ABSCISSAE, _WEIGHTS = (_ABSCISSAE + 1) / 2, _WEIGHTS / 2
-
-
-def _at(values: Floats, slopes: Floats, x: Floats) -> Floats:
-    """Cubic Hermite interpolation over equally spaced nodes of [0, 1]; axis 1 is the nodes."""
-    pieces = values.shape[1] - 1
-    piece = np.minimum((x * pieces).astype(np.intp), pieces - 1)
-    u = (x * pieces - piece)[:, None]
-    left, right = values[:, piece], values[:, piece + 1]
-    rise, fall = slopes[:, piece] / pieces, slopes[:, piece + 1] / pieces
-    return np.asarray(
-        left + u * (rise + u * (3 * (right - left) - 2 * rise - fall + u * (2 * (left - right) + rise + fall)))
-    )
 
 
 class _Moments(NamedTuple):
@@ -44,10 +34,10 @@ class _Moments(NamedTuple):
 def _moments(nodes: int, pieces: int) -> _Moments:
     """In units of 1/pieces; those of the hat functions at both ends, which are given, are taken off."""
     x = (np.arange(pieces)[:, None] + _ABSCISSAE).ravel() / pieces
-    unit, nothing = np.eye(nodes)[None], np.zeros((1, nodes, nodes))
+    unit, nothing = np.eye(nodes), np.zeros((nodes, nodes))
     loads = []
-    for values, slopes in ((unit, nothing), (nothing, unit)):
-        curve = _at(values, slopes, x)[0].reshape(pieces, 4, nodes)
+    for values, slopes in ((unit, nothing), (nothing, unit / (nodes - 1))):
+        curve = cubic(x * (nodes - 1), np.arange(nodes, dtype=np.float64), values, slopes).reshape(pieces, 4, nodes)
         left = np.einsum("q,kqc->kc", _WEIGHTS * (1 - _ABSCISSAE), curve)
         right = np.einsum("q,kqc->kc", _WEIGHTS * _ABSCISSAE, curve)
         loads.append(left[1:] + right[:-1])

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plan import ChainState, Ramp, ToneRamp
+from ..operating_point import OperatingPoint
+from ..plan import Ramp, ToneRamp
 
 __all__ = ["as_tone", "joined", "rest_for", "turned_ramp", "turned_state"]
 
@@ -19,7 +20,7 @@ Numbers = NDArray[Any]
 INSTANT_S = 1e-4
 
 
-def turned_state(state: ChainState, turn: float) -> ChainState:
+def turned_state(state: OperatingPoint, turn: float) -> OperatingPoint:
     """A state whose motion is turned by an angle in radians."""
     if turn == 0.0:
         return state
@@ -69,7 +70,7 @@ def rest_for(ramp: Ramp, seconds: float) -> Ramp:
     return replace(ramp, t_s=t_s, bias=longer(ramp.bias), bias_slope=longer(ramp.bias_slope), tones=tuple(tones))
 
 
-def joined(first: Ramp, second: Ramp, before: ChainState, after: ChainState) -> Ramp:
+def joined(first: Ramp, second: Ramp, before: OperatingPoint, after: OperatingPoint) -> Ramp:
     """`first`, which leads from `before` to rest and has its drive among its tones, then `second`, to `after`.
 
     Every curve of one of them is still while the other lasts.
@@ -126,7 +127,9 @@ def _merged(tones: list[ToneRamp]) -> tuple[ToneRamp, ...]:
     return tuple(found.values())
 
 
-def _links(first: Ramp, second: Ramp, before: ChainState, after: ChainState) -> tuple[Floats | None, Floats | None]:
+def _links(
+    first: Ramp, second: Ramp, before: OperatingPoint, after: OperatingPoint
+) -> tuple[Floats | None, Floats | None]:
     if not before.lam.size:
         return None, None
     times, links = [], []

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from chainsim import Chain
 
 from ..errors import PlanError
+from ..operating_point import OperatingPoint
 from .check import Way
-from .steering import Standing
 
 __all__ = ["WayError", "WayLimits", "checked"]
 
@@ -85,7 +85,7 @@ class WayLimits:
 
 def checked(
     chain: Chain, epsilon: complex, lam: Floats, omega: float, phasor: Complexes, limits: WayLimits, tau_per_s: float
-) -> Standing:
+) -> OperatingPoint:
     """The motion to go to, or from.
 
     Raises
@@ -105,4 +105,4 @@ def checked(
             raise WayError(f"{name}: expected a finite number > 0, got {value}")
     if limits.lam_scope == "chain" and links.size and np.ptp(links) > 0:
         raise WayError(f"lam: the limits allow one for the whole chain, got {links}")
-    return Standing(complex(epsilon), links, motion)
+    return OperatingPoint(complex(epsilon), links, omega, motion)

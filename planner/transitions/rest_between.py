@@ -12,17 +12,17 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device, GridIntegrator
+from chainsim import Device
 
-from ..plan import ChainState, Ramp
+from ..drive import FirstOrderHold, felt, play
+from ..operating_point import OperatingPoint
+from ..plan import Ramp
 from .check import SAMPLES_PER_PERIOD as SAMPLES, Orbit
 from .rise import orbit_of
-from .steering import Standing
 
 __all__ = ["rested"]
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Rests tried, in e-folds of a single actuator, and for how many of them the motion is watched afterwards.
 RESTS, WATCHED = (0.0, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 9.0, 14.0, 20.0, 30.0), 2.0
@@ -30,7 +30,7 @@ RESTS, WATCHED = (0.0, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 9.0, 14.0, 20.0, 30.0), 2.0
 GOOD, LIKE = 7e-4, 1.2
 
 
-def rested(device: Device, before: ChainState, after: ChainState, way: Callable[[float], Ramp]) -> Ramp:
+def rested(device: Device, before: OperatingPoint, after: OperatingPoint, way: Callable[[float], Ramp]) -> Ramp:
     """The way with the shortest rest after which `after` stands, or stands as well as after any.
 
     Parameters
@@ -48,64 +48,20 @@ def rested(device: Device, before: ChainState, after: ChainState, way: Callable[
     return next(ramp for missed, ramp in tried if missed <= LIKE * least)
 
 
-def _missed(device: Device, before: ChainState, after: ChainState, ramp: Ramp) -> float:
+def _missed(device: Device, before: OperatingPoint, after: OperatingPoint, ramp: Ramp) -> float:
     """Worst deviation after the way, relative to the largest amplitude of `after`."""
     dtau = 2 * math.pi / after.omega / SAMPLES
     steps = math.ceil(ramp.duration_s * device.tau_per_s / dtau)
     watched = math.ceil(WATCHED * 2 / device.delta / dtau / SAMPLES)
     tau = np.arange(steps + watched * SAMPLES, dtype=np.float64) * dtau
-    force = np.zeros((len(tau), 1, device.chain_length))
-    force[:, 0, 0] = _drive(device, after, ramp, tau, dtau)
-    lam = np.zeros_like(force)
-    lam[:, 0, 1:] = after.lam
-    if ramp.lam is not None and ramp.lam_t_s is not None:
-        for link, course in enumerate(ramp.lam.T):
-            lam[:steps, 0, link + 1] = np.interp(tau[:steps] / device.tau_per_s, ramp.lam_t_s, course)
-    chain = device.chain
-    grid = GridIntegrator(
-        shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
-        ring=False, dtau=dtau,
-    )  # fmt: skip
-    grid.advance(_prelude(device, before, dtau)[:, None, :], np.concatenate([[0.0], before.lam])[None, :])
-    z = grid.advance(force, lam)[steps:, 0]
-    turned = (z * np.exp(-1j * after.omega * tau[steps:, None])).reshape(watched, SAMPLES, -1)
-    away = np.abs(2 * turned.mean(axis=1) - after.phasor).max() / np.abs(after.phasor).max()
+    ahead = _prelude(device, before, dtau), before.lam
+    z = play(device, after, ramp, tau, ahead=ahead)[steps:]
+    carrier = np.exp(1j * after.omega * tau[steps:, None])
+    away = np.abs(felt(z, carrier, SAMPLES) - after.phasor).max() / np.abs(after.phasor).max()
     return float(away) if np.isfinite(away) else math.inf
 
 
-def _prelude(device: Device, held: ChainState, dtau: float) -> Floats:
+def _prelude(device: Device, held: OperatingPoint, dtau: float) -> Floats:
     """Forces on every actuator that lead from rest to a motion at tau = 0, up to the sample before it."""
-    standing = Standing(held.epsilon, held.lam, held.phasor)
-    orbit = orbit_of(device.chain, standing, held.omega)[0] or Orbit(held.phasor[None, :], held.lam, held.omega)
-    half = held.omega * dtau / 2
-    return orbit.prelude(device.chain, dtau, 0.0) * (half / math.sin(half)) ** 2
-
-
-def _drive(device: Device, after: ChainState, ramp: Ramp, tau: Floats, dtau: float) -> Floats:
-    """The drive's force on the way and after it."""
-    t_s = tau / device.tau_per_s
-    on_way = t_s < ramp.duration_s
-    force = np.zeros(len(tau))
-    tones = [(after.omega, ramp.epsilon, ramp.epsilon_slope, after.epsilon)]
-    tones += [(tone.omega, tone.epsilon, tone.epsilon_slope, 0j) for tone in ramp.tones]
-    for omega, values, slopes, last in tones:
-        envelope = np.where(on_way, 0j, last)
-        tilt = np.zeros(len(tau), dtype=np.complex128)
-        if values is not None and slopes is not None:
-            envelope[on_way] = _curve(t_s[on_way], ramp.t_s, values, slopes)
-            tilt[on_way] = np.interp(t_s[on_way], ramp.t_s, slopes) / device.tau_per_s
-        # Straight lines between samples pass the carrier and its slope as in `way_check.travel`.
-        half = omega * dtau / 2
-        sinc = math.sin(half) / half
-        lead = dtau * sinc * (half * math.cos(half) - math.sin(half)) / half**2
-        force += ((envelope / sinc**2 + 1j * tilt * lead / sinc**4) * np.exp(1j * omega * tau)).real
-    return force
-
-
-def _curve(at: Floats, t: Floats, values: Complexes, slopes: Complexes) -> Complexes:
-    """Cubic Hermite curve; two nodes at one time are a jump."""
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
-    width, rise = np.diff(t)[k], np.diff(values)[k]
-    s = (at - t[k]) / np.where(width > 0, width, 1.0)
-    begin, end = width * slopes[k], width * slopes[k + 1]
-    return np.asarray(values[k] + s * (begin + s * (3 * rise - 2 * begin - end + s * (begin + end - 2 * rise))))
+    orbit = orbit_of(device.chain, held)[0] or Orbit(held.phasor[None, :], held.lam, held.omega)
+    return orbit.prelude(device.chain, dtau, 0.0) / FirstOrderHold.of(held.omega, dtau).passed

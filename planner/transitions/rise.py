@@ -7,6 +7,7 @@ found on the slow flow is then corrected until the full equations arrive, and tr
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import chain as chain_of
 
 import numpy as np
@@ -14,11 +15,12 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting
 
+from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way
 from .limits import WayLimits, checked
-from .search import ARRIVES, Search
-from .steering import Standing, rest
+from .search import ARRIVES, RampSearch
+from .steering import rest
 
 __all__ = ["find_way", "orbit_of", "ramp_of"]
 
@@ -54,11 +56,11 @@ def find_way(
         When an argument does not fit the chain.
     """
     held = checked(chain, epsilon, lam, omega, phasor, limits, tau_per_s)
-    orbit, lacking = orbit_of(chain, held, omega)
+    orbit, lacking = orbit_of(chain, held)
     if orbit is not None and not lacking:
-        held = Standing(held.epsilon, held.lam, orbit.harmonics[0])
+        held = replace(held, phasor=orbit.harmonics[0])
         lacking = limits.unfit(held.lam)
-    search = Search(chain, rest(held.lam), held, omega, limits, tau_per_s, budget)
+    search = RampSearch(chain, rest(held.lam, omega), held, omega, limits, tau_per_s, budget)
     if not lacking:
         found = search.shorter_and_shorter()
         longer = search.longer_and_longer(found[0][0]) if found else ()
@@ -71,18 +73,18 @@ def find_way(
     return ramp_of(search.way(plain, np.zeros(plain.size)), limits, tau_per_s, lacking)
 
 
-def orbit_of(chain: Chain, held: Standing, omega: float) -> tuple[Orbit | None, str]:
+def orbit_of(chain: Chain, point: OperatingPoint) -> tuple[Orbit | None, str]:
     """The periodic motion the settings hold near the phasors, and why there is none to go to."""
     from chainsim import balance_near
 
     setting = Setting.of(
-        chain, epsilon=abs(held.epsilon), phase=float(np.angle(held.epsilon)), lam=held.lam, omega=omega
+        chain, epsilon=abs(point.epsilon), phase=float(np.angle(point.epsilon)), lam=point.lam, omega=point.omega
     )
-    answer = balance_near(chain, setting, held.phasor[None, :], tol=ARRIVES / 100)
+    answer = balance_near(chain, setting, point.phasor[None, :], tol=ARRIVES / 100)
     if answer.outcome[0] not in (Outcome.OK, Outcome.UNSTABLE):
         return None, f"these settings hold no motion near these phasors ({answer.outcome[0]})"
-    orbit = Orbit(answer.harmonics[0], held.lam, omega)
-    away = float(np.abs(orbit.harmonics[0] - held.phasor).max() / np.abs(held.phasor).max())
+    orbit = Orbit(answer.harmonics[0], point.lam, point.omega)
+    away = float(np.abs(orbit.harmonics[0] - point.phasor).max() / np.abs(point.phasor).max())
     if not away <= NEAR:
         return orbit, f"what these settings hold differs from these phasors by {100 * away:.2g} %"
     if not answer.stable[0]:

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
+from ..operating_point import OperatingPoint
 from .check import Orbit, Passage, Way, travel
 from .gauss_newton import Steered, slopes_at, steer
 from .hermite import broken_line
 from .limits import WayLimits
-from .steering import LinkCourse, Standing, Steering
+from .steering import LinkCourse, Steering
 
-__all__ = ["ARRIVES", "MOST_PERIODS", "STANDS", "Search"]
+__all__ = ["ARRIVES", "MOST_PERIODS", "STANDS", "RampSearch"]
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ LEAST_ADVANCE, FASTER, SLOWER = 0.05, 1.5, 4.0
 
 
 @dataclass
-class Search:
+class RampSearch:
     """Lengths tried one after another; `spent` slopes so far, `lacking` what stopped the last one.
 
     A way is gone from `start` to `held`, one of which may be rest. `orbit` is the motion it all begins with in the full
@@ -61,8 +62,8 @@ class Search:
     """
 
     chain: Chain
-    start: Standing
-    held: Standing
+    start: OperatingPoint
+    held: OperatingPoint
     omega: float
     limits: WayLimits
     tau_per_s: float

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, GridIntegrator
+from chainsim import Closure, Device
 
-from ..plan import Ramp, Tone, ToneRamp
+from ..drive import felt, play, smooth_step
+from ..operating_point import OperatingPoint, PointTone
+from ..plan import Ramp, ToneRamp
 
-__all__ = ["SAMPLES", "STAYS", "Sounding", "felt_envelope", "slow_fall", "slow_rise"]
+__all__ = ["Watched", "periods_in", "settled", "slow_fall", "slow_rise", "watched"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,103 +34,104 @@ FALL_PERIODS = 8
 LEFT = 1e-3
 
 
-@dataclass(frozen=True)
-class Sounding:
-    """A standing motion of one chain: its tones (the first is the main one), its links, shape (n-1,), and the largest
-    modulus of its Floquet multipliers, 0 where that is not known.
-    """
-
-    tones: tuple[Tone, ...]
-    lam: Floats
-    multiplier: float = 0.0
-
-    def wait(self, device: Device) -> float:
-        """How long to wait at most, in tau; a disturbance shrinks by the multiplier in every period."""
-        if not 0 < self.multiplier < 1:
-            return LONGER_WAIT * 2 / device.delta
-        return -WAIT * 2 * math.pi / self.tones[0].omega / math.log(self.multiplier)
-
-
-def slow_rise(device: Device, held: Sounding, tolerance: float) -> Ramp:
+def slow_rise(device: Device, point: OperatingPoint, tolerance: float) -> Ramp:
     """The shortest of the slow ways from rest; `tolerance` relative to the largest amplitude.
 
     The drive of the first tone is the ramp's own, the others are its `tones`.
     """
     efold = 2 / device.delta
-    found = [(rise, _settled(device, held, rise * efold, tolerance)) for rise in RISES]
-    known = [(settled, rise) for rise, settled in found if settled is not None]
+    found = [(rise, _settled(device, point, rise * efold, tolerance)) for rise in RISES]
+    known = [(end, rise) for rise, end in found if end is not None]
     if not known:
         lacking = "the motion does not come to stand from rest; it lacks damping, or a lam that can move on the way"
-        return _rise_ramp(device, held, RISES[-1] * efold, RISES[-1] * efold, lacking)
-    settled, rise = min(known)
-    return _rise_ramp(device, held, rise * efold, settled, "")
+        return _rise_ramp(device, point, RISES[-1] * efold, RISES[-1] * efold, lacking)
+    end, rise = min(known)
+    return _rise_ramp(device, point, rise * efold, end, "")
 
 
-def _step(x: Floats) -> Floats:
-    return np.asarray(x**3 * (10 - 15 * x + 6 * x**2))
-
-
-def _rise_ramp(device: Device, held: Sounding, rise: float, end: float, lacking: str) -> Ramp:
+def _rise_ramp(device: Device, point: OperatingPoint, rise: float, end: float, lacking: str) -> Ramp:
     x = np.linspace(0.0, 1.0, NODES)
     # After the rise the drive stands still while the motion comes to stand.
     tau = np.append(x * rise, max(end, rise * (1 + 1e-9)))
-    step = np.append(_step(x), 1.0)
-    slope = np.append(30 * (x * (1 - x)) ** 2, 0.0) / rise * device.tau_per_s
-    first, *others = [_tone_ramp(tone, step, slope) for tone in held.tones]
+    size = smooth_step(x)
+    step, slope = np.append(size.value, 1.0), np.append(size.slope, 0.0) / rise * device.tau_per_s
+    first, *others = [_tone_ramp(tone, step, slope) for tone in point.every_tone]
     return Ramp(tau / device.tau_per_s, first.epsilon, first.epsilon_slope, lacking=lacking, tones=tuple(others))
 
 
-def _tone_ramp(tone: Tone, size: Floats, slope: Floats) -> ToneRamp:
+def _tone_ramp(tone: PointTone, size: Floats, slope: Floats) -> ToneRamp:
     return ToneRamp(tone.omega, np.asarray(tone.epsilon * size), np.asarray(tone.epsilon * slope))
 
 
-def _settled(device: Device, held: Sounding, rise: float, tolerance: float) -> float | None:
+def _settled(device: Device, point: OperatingPoint, rise: float, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good; None where it does not."""
-    omega = held.tones[0].omega
-    dtau = 2 * math.pi / omega / SAMPLES
-    periods = math.ceil((rise + held.wait(device)) / (dtau * SAMPLES))
-    tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
-    size = _step(np.minimum(tau / rise, 1.0))
-    force = np.zeros((len(tau), 1, device.chain_length))
-    for tone in held.tones:
-        # Straight lines between samples pass a carrier with sinc^2.
-        half = tone.omega * dtau / 2
-        force[:, 0, 0] += size * (tone.epsilon * np.exp(1j * tone.omega * tau)).real * (half / math.sin(half)) ** 2
-    lam = np.concatenate([held.lam[:1], held.lam])[None, :]
-    ring = device.coupling.closure is Closure.RING
-    chain = device.chain
-    grid = GridIntegrator(
-        shape=(1, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
-        ring=ring, dtau=dtau,
-    )  # fmt: skip
-    z = grid.advance(force, lam)[:, 0]
-    felt = felt_envelope(z, omega, tau)
+    periods = periods_in(rise + _wait(device, point), point.omega)
+    seen = watched(device, point, _rise_ramp(device, point, rise, rise, ""), periods)
+    return settled(seen.restless(tolerance), periods, point.omega)
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What comes of a ramp.
+
+    Attributes
+    ----------
+    away : float64, shape (periods,), worst deviation from the point, relative to its largest amplitudes together.
+    peak : largest |z| of all.
+    """
+
+    away: Floats
+    peak: float
+
+    def restless(self, tolerance: float) -> int:
+        """Periods until the motion stands for good."""
+        bad = np.flatnonzero(~(self.away <= tolerance))
+        return int(bad[-1]) + 1 if len(bad) else 0
+
+
+def periods_in(tau: float, omega: float) -> int:
+    """Whole periods that cover a time."""
+    return math.ceil(tau / (2 * math.pi / omega / SAMPLES * SAMPLES))
+
+
+def settled(restless: int, periods: int, omega: float) -> float | None:
+    """The end, in tau, of the first period that stands; None where that is too late in those that were watched."""
+    last = ((restless + 1) * SAMPLES - 1) * (2 * math.pi / omega / SAMPLES)
+    return last if restless < (1 - STAYS) * periods else None
+
+
+def watched(device: Device, point: OperatingPoint, ramp: Ramp, periods: int, start: float = 0.0) -> Watched:
+    """Follow a ramp from rest in the full equations; `start` : of the ramp, tau from that of the whole plan."""
+    tau = np.arange(periods * SAMPLES, dtype=np.float64) * (2 * math.pi / point.omega / SAMPLES)
+    z = play(device, point, ramp, tau, start=start)
+    turning = {tone.omega: np.exp(1j * tone.omega * (start + tau))[:, None] for tone in point.every_tone}
     wanted = np.zeros_like(z)
-    for tone in held.tones:
-        wanted += (np.exp(1j * tone.omega * tau)[:, None] * tone.phasor).real
-    scale = sum(float(np.abs(tone.phasor).max()) for tone in held.tones)
-    away = np.abs(np.subtract(felt, felt_envelope(wanted, omega, tau))).max(axis=1)
-    bad = np.flatnonzero(~(away <= tolerance * scale))
-    last = int(bad[-1]) + 1 if len(bad) else 0
-    return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
+    for tone in point.every_tone:
+        wanted += (turning[tone.omega] * tone.phasor).real
+    scale = sum(float(np.abs(tone.phasor).max()) for tone in point.every_tone)
+    ours, theirs = (felt(motion, turning[point.omega], SAMPLES) for motion in (z, wanted))
+    return Watched(np.abs(ours - theirs).max(axis=1) / scale, float(np.abs(z).max()))
 
 
-def felt_envelope(z: Floats, omega: float, tau: Floats) -> Complexes:
-    """First harmonic in each period; complex128, shape (periods, n)."""
-    turned = z * np.exp(-1j * omega * tau)[:, None]
-    return np.asarray(2 * turned.reshape(-1, SAMPLES, z.shape[1]).mean(axis=1))
+def _wait(device: Device, point: OperatingPoint) -> float:
+    """How long to wait at most, in tau; a disturbance shrinks by the largest Floquet multiplier in every period."""
+    multiplier = point.margins.multiplier
+    if not 0 < multiplier < 1:
+        return LONGER_WAIT * 2 / device.delta
+    return -WAIT * 2 * math.pi / point.omega / math.log(multiplier)
 
 
-def slow_fall(device: Device, held: Sounding, opens: bool) -> Ramp:
+def slow_fall(device: Device, point: OperatingPoint, opens: bool) -> Ramp:
     """The drive is taken away, the links are opened where they may be, and the motion dies away by itself.
 
     It ends when small motions, which the largest amplitude bounds, have fallen to 1/1000.
     """
     length = 2 * math.pi * FALL_PERIODS
     x = np.linspace(0.0, 1.0, NODES)
-    lam = held.lam + ((device.coupling.lam.min if opens else held.lam) - held.lam) * _step(x)[:, None]
+    step = smooth_step(x)
+    lam = point.lam + ((device.coupling.lam.min if opens else point.lam) - point.lam) * step.value[:, None]
     end = length + _dying(device, lam[-1])
-    still, slope = 1 - _step(x), -30 * (x * (1 - x)) ** 2 / length * device.tau_per_s
+    still, slope = 1 - step.value, -step.slope / length * device.tau_per_s
     still, slope, lam = np.append(still, 0.0), np.append(slope, 0.0), np.vstack([lam, lam[-1:]])
     t_s = np.append(x * length, end) / device.tau_per_s
     moves = opens and lam.size > 0
@@ -136,7 +139,7 @@ def slow_fall(device: Device, held: Sounding, opens: bool) -> Ramp:
         t_s=t_s,
         lam_t_s=t_s if moves else None,
         lam=lam if moves else None,
-        tones=tuple(_tone_ramp(tone, still, slope) for tone in held.tones),
+        tones=tuple(_tone_ramp(tone, still, slope) for tone in point.every_tone),
     )
 
 

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-__all__ = ["Course", "follow_course"]
+__all__ = ["DriveCourse", "follow_course"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Course:
+class DriveCourse:
     """What is done to a chain on the way, at the 2 N + 1 ends and middles of N equal steps.
 
     Attributes
@@ -40,7 +40,7 @@ class Course:
 
 
 def follow_course(
-    chain: Chain, omega: float, duration: float, course: Course, start: Complexes, softness: float
+    chain: Chain, omega: float, duration: float, course: DriveCourse, start: Complexes, softness: float
 ) -> Complexes:
     """Amplitudes on the way, by Runge and Kutta's fourth-order steps.
 

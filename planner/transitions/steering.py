@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from .slow_flow import Course, follow_course
+from ..drive import smooth_step
+from ..operating_point import OperatingPoint
+from .slow_flow import DriveCourse, follow_course
 
-__all__ = ["LinkCourse", "Standing", "Steering", "rest", "smooth_step"]
+__all__ = ["LinkCourse", "Steering", "rest"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -33,30 +35,9 @@ STEP = 0.25
 MOVEMENT, LOOKS, EFFORT = 0.02, 40, 1e-4
 
 
-@dataclass(frozen=True)
-class Standing:
-    """A steady motion of a chain of n, or rest.
-
-    Attributes
-    ----------
-    epsilon : complex drive phasor. lam : float64, shape (n-1,), links. phasor : complex128, shape (n,), dimensionless.
-    turning : radians per tau by which drive and motion turn in the frame of the way.
-    """
-
-    epsilon: complex
-    lam: Floats
-    phasor: Complexes
-    turning: float = 0.0
-
-    @property
-    def resting(self) -> bool:
-        """Whether nothing moves: links are then free."""
-        return not self.phasor.any()
-
-
-def rest(lam: Floats) -> Standing:
+def rest(lam: Floats, omega: float) -> OperatingPoint:
     """Rest, with links of which only the number matters where they may move."""
-    return Standing(0j, lam, np.zeros(len(lam) + 1, dtype=np.complex128))
+    return OperatingPoint(0j, lam, omega, np.zeros(len(lam) + 1, dtype=np.complex128))
 
 
 @dataclass(frozen=True)
@@ -69,7 +50,7 @@ class LinkCourse:
     top: float | None
     share: float
 
-    def at(self, x: Floats, start: Standing, held: Standing) -> tuple[Floats, Floats]:
+    def at(self, x: Floats, start: OperatingPoint, held: OperatingPoint) -> tuple[Floats, Floats]:
         """Links and their derivatives in x at x in [0, 1]; each float64, shape (len(x), n-1)."""
         if self.top is None:
             still = np.repeat((start if held.resting else held).lam[None, :], len(x), axis=0)
@@ -77,17 +58,11 @@ class LinkCourse:
         value, slope = np.full((len(x), len(held.lam)), self.top), np.zeros((len(x), len(held.lam)))
         for end, place, way in ((start, x / self.share, -1.0), (held, (x - 1) / self.share + 1, 1.0)):
             if not end.resting:
-                step, rise = smooth_step(place)
+                step, rise, _ = smooth_step(place)
                 share = step if way > 0 else 1 - step
                 value += (end.lam - self.top) * share[:, None]
                 slope += (end.lam - self.top) * way * rise[:, None] / self.share
         return value, slope
-
-
-def smooth_step(x: Floats) -> tuple[Floats, Floats]:
-    """The C^2 step from 0 at x <= 0 to 1 at x >= 1, and its derivative."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * (1 - x) ** 2
 
 
 def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
@@ -109,12 +84,15 @@ def splines(x: Floats, intervals: int) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Steering:
-    """The task: `chain` at `omega` from `start` to `held` in `duration` (tau) with the links on `links`."""
+    """The task: `chain` at `omega` from `start` to `held` in `duration` (tau) with the links on `links`.
+
+    A start at another frequency than `omega` turns in the frame of the way.
+    """
 
     chain: Chain
     omega: float
-    start: Standing
-    held: Standing
+    start: OperatingPoint
+    held: OperatingPoint
     links: LinkCourse
     duration: float
 
@@ -153,8 +131,8 @@ class Steering:
         half = self.size // 2
         factors = self.unit * (unknowns[:, :half] + 1j * unknowns[:, half:]).T
         value, slope = splines(x, self.intervals)
-        step, step_slope = smooth_step(x)
-        last, angle = self.held.epsilon, 1j * self.start.turning * self.duration
+        step, step_slope, _ = smooth_step(x)
+        last, angle = self.held.epsilon, 1j * (self.start.omega - self.omega) * self.duration
         first = self.start.epsilon * np.exp(angle * x)
         steady, steady_slope = first + (last - first) * step, (last - first) * step_slope + angle * first * (1 - step)
         return np.asarray(steady[:, None] + value @ factors), np.asarray(steady_slope[:, None] + slope @ factors)
@@ -164,7 +142,7 @@ class Steering:
         x = np.linspace(0.0, 1.0, 2 * self.steps + 1)
         epsilon, epsilon_slope = self.drive(x, unknowns)
         lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.start, self.held))
-        course = Course(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
+        course = DriveCourse(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
         with np.errstate(all="ignore"):
             return follow_course(self.chain, self.omega, self.duration, course, self.start.phasor, softness)
 
@@ -172,7 +150,7 @@ class Steering:
         """Squares of amplitudes between those of the ends; rest has none to lend."""
         ends = [self.held if one.resting else one for one in (self.start, self.held)]
         first, last = (np.abs((self.start if one.resting else one).phasor) ** 2 for one in ends)
-        return np.asarray(first + (last - first) * smooth_step(x)[0][:, None])
+        return np.asarray(first + (last - first) * smooth_step(x).value[:, None])
 
     def misses(self, unknowns: Floats, softness: float) -> tuple[Floats, Floats]:
         """By how much the end is missed, shape (P, 2 n), and movement and effort, shape (P, S)."""

@@ -7,20 +7,23 @@ come to stand by and by, which is followed in the full equations for several pla
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device, GridIntegrator
+from chainsim import Device
 
-from ..plan import Ramp, Tone, ToneRamp
+from ..drive import smooth_step
+from ..operating_point import OperatingPoint, PointTone
+from ..plan import Ramp, ToneRamp
 from .gauss_newton import steer
 from .hermite import broken_line
+from .joining import as_tone
 from .limits import WayLimits
 from .search import COMING_DOWN, MET, NODES_PER_INTERVAL, PIECE_S, STRONG
-from .slow import SAMPLES, STAYS, Sounding, felt_envelope
-from .steering import LinkCourse, Standing, Steering, rest, smooth_step
+from .slow import periods_in, settled, watched
+from .steering import LinkCourse, Steering, rest
 
 __all__ = ["quick_rise"]
 
@@ -43,19 +46,29 @@ class _OneOfTwo(Steering):
         return np.repeat(square[None, :], len(x), axis=0)
 
 
-def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: float) -> Ramp | None:
+def quick_rise(device: Device, point: OperatingPoint, limits: WayLimits, tolerance: float) -> Ramp | None:
     """The way, or None where it is none within the limits; `tolerance` relative to the largest amplitude."""
-    mains = [tone for tone in held.tones if not tone.side]
-    tasks = [_task(device, held, mains[k], mains[1 - k], limits) for k in (0, 1)]
+    way = _steered(device, point, limits)
+    stands = None if way is None else _settled(device, point, way, limits, tolerance)
+    if way is None or stands is None or _too_strong(way, limits, device.tau_per_s, point.omega):
+        return None
+    # The drive stands still while the motion comes to stand.
+    return replace(way, t_s=np.append(way.t_s[:-1], max(stands / device.tau_per_s, way.duration_s)))
+
+
+def _steered(device: Device, point: OperatingPoint, limits: WayLimits) -> Ramp | None:
+    """Each tone on its way alone, then for an instant as it stays; None where one does not arrive."""
+    mains = [tone for tone in point.every_tone if not tone.side]
+    tasks = [_task(device, point, mains[k], mains[1 - k], limits) for k in (0, 1)]
     steered = [steer(task, np.zeros(task.size), 0.0, STEPS) for task in tasks]
     if max(one.missed for one in steered) > MET:
         return None
     task = tasks[0]
     x = np.linspace(0.0, 1.0, NODES_PER_INTERVAL * task.intervals + 1)
-    step, step_slope = smooth_step(x)
+    step, step_slope, _ = smooth_step(x)
     own = dict(zip((tone.omega for tone in mains), zip(tasks, steered, strict=True), strict=True))
     tones = []
-    for tone in held.tones:
+    for tone in point.every_tone:
         value, slope = tone.epsilon * step, tone.epsilon * step_slope
         if not tone.side:
             one, found = own[tone.omega]
@@ -67,74 +80,36 @@ def quick_rise(device: Device, held: Sounding, limits: WayLimits, tolerance: flo
     pieces = max(8, math.ceil(task.duration / device.tau_per_s / PIECE_S))
     lam = np.clip(broken_line(links[None], links_slope[None], pieces)[0], limits.lam_min, links.max())
     tau, lam_tau = x * task.duration, np.linspace(0.0, task.duration, pieces + 1)
-    settled = _settled(device, held, _Played(tau, lam_tau, lam, tuple(tones)), limits, tolerance)
-    if settled is None or _too_strong(tones, limits, device.tau_per_s):
-        return None
-    t_s = np.append(tau, max(settled, tau[-1] * (1 + 1e-9))) / device.tau_per_s
-    return Ramp(
-        t_s, first.epsilon, first.epsilon_slope, lam_t_s=lam_tau / device.tau_per_s, lam=lam, tones=tuple(others)
-    )
+    t_s, lam_t_s = np.append(tau, tau[-1] * (1 + 1e-9)) / device.tau_per_s, lam_tau / device.tau_per_s
+    return Ramp(t_s, first.epsilon, first.epsilon_slope, lam_t_s=lam_t_s, lam=lam, tones=tuple(others))
 
 
-def _task(device: Device, held: Sounding, tone: Tone, other: Tone, limits: WayLimits) -> _OneOfTwo:
-    top = max(min(limits.lam_max, STRONG), float(held.lam.max()))
+def _task(device: Device, point: OperatingPoint, tone: PointTone, other: PointTone, limits: WayLimits) -> _OneOfTwo:
+    top = max(min(limits.lam_max, STRONG), float(point.lam.max()))
     duration = STAGE_TIMES * (device.chain_length + 1) * 2 * tone.omega / max(top, device.delta)
-    standing = Standing(tone.epsilon, held.lam, tone.phasor)
+    end = OperatingPoint(tone.epsilon, point.lam, tone.omega, tone.phasor)
     links = LinkCourse(top, COMING_DOWN)
-    return _OneOfTwo(device.chain, tone.omega, rest(held.lam), standing, links, duration, other.phasor)
+    return _OneOfTwo(device.chain, tone.omega, rest(point.lam, tone.omega), end, links, duration, other.phasor)
 
 
-def _too_strong(tones: list[ToneRamp], limits: WayLimits, tau_per_s: float) -> bool:
+def _too_strong(way: Ramp, limits: WayLimits, tau_per_s: float, omega: float) -> bool:
     """Whether the tones together take more than the amplifier gives."""
-    drive = np.sum([np.abs(tone.epsilon) for tone in tones], axis=0)
-    change = np.zeros(len(drive))
-    for tone in tones:
+    drive, change = np.zeros(len(way.t_s)), np.zeros(len(way.t_s))
+    for tone in as_tone(way, omega).tones:
         slope = 0.0 if tone.epsilon_slope is None else tone.epsilon_slope
+        drive += np.abs(tone.epsilon)
         change += np.abs(slope + 1j * tone.omega * tau_per_s * tone.epsilon)
     return bool(drive.max() > limits.epsilon_max or change.max() > limits.slew_per_s)
 
 
-@dataclass(frozen=True)
-class _Played:
-    """Drive nodes at `tau`, and one behind the end; links."""
-
-    tau: Floats
-    lam_tau: Floats
-    lam: Floats
-    tones: tuple[ToneRamp, ...]
-
-    def envelope(self, tone: ToneRamp, tau: Floats) -> Complexes:
-        """Of a tone at instants."""
-        here = np.interp(tau, self.tau, tone.epsilon[:-1].real) + 1j * np.interp(tau, self.tau, tone.epsilon[:-1].imag)
-        return np.where(tau < self.tau[-1], here, tone.epsilon[-1])
-
-
-def _settled(device: Device, held: Sounding, way: _Played, limits: WayLimits, tolerance: float) -> float | None:
+def _settled(device: Device, point: OperatingPoint, way: Ramp, limits: WayLimits, tolerance: float) -> float | None:
     """When, in tau, the motion stands for good at every place of the beat; None where it does not."""
-    n, omega = device.chain_length, held.tones[0].omega
-    dtau = 2 * math.pi / omega / SAMPLES
-    periods = math.ceil((float(way.tau[-1]) + WAIT * 2 / device.delta) / dtau / SAMPLES)
-    tau = np.arange(periods * SAMPLES, dtype=np.float64) * dtau
-    gap = next(tone.omega for tone in held.tones[1:] if not tone.side) - omega
-    lam = np.zeros((len(tau), 1, n))
-    for link in range(n - 1):
-        lam[:, 0, link + 1] = np.interp(tau, way.lam_tau, way.lam[:, link])
-    envelopes = [way.envelope(tone, tau) for tone in way.tones]
-    last = 0
+    omega, periods = point.omega, periods_in(way.duration_s * device.tau_per_s + WAIT * 2 / device.delta, point.omega)
+    gap = next(tone.omega for tone in point.tones if not tone.side) - omega
+    restless = 0
     for beat in BEATS:
-        force, wanted = np.zeros((len(tau), 1, n)), np.zeros((len(tau), n))
-        for tone, envelope in zip(held.tones, envelopes, strict=True):
-            turning = np.exp(1j * (tone.omega * tau + 2 * math.pi * beat * round((tone.omega - omega) / gap)))
-            # Straight lines between samples pass a carrier with sinc^2.
-            half = tone.omega * dtau / 2
-            force[:, 0, 0] += (envelope * turning).real * (half / math.sin(half)) ** 2
-            wanted += (turning[:, None] * tone.phasor).real
-        grid = GridIntegrator(shape=(1, n), chain_length=n, delta=device.delta, beta=device.beta, ring=False, dtau=dtau)
-        z = grid.advance(force, lam)[:, 0]
-        if not np.abs(z).max() <= limits.hilltop(device.chain):
+        seen = watched(device, point, way, periods, beat * 2 * math.pi / abs(gap))
+        if not seen.peak <= limits.hilltop(device.chain):
             return None
-        scale = sum(float(np.abs(tone.phasor).max()) for tone in held.tones)
-        away = np.abs(felt_envelope(z, omega, tau) - felt_envelope(wanted, omega, tau)).max(axis=1)
-        bad = np.flatnonzero(~(away <= tolerance * scale))
-        last = max(last, int(bad[-1]) + 1 if len(bad) else 0)
-    return float(tau[(last + 1) * SAMPLES - 1]) if last < (1 - STAYS) * periods else None
+        restless = max(restless, seen.restless(tolerance))
+    return settled(restless, periods, omega)

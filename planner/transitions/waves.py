@@ -2,68 +2,66 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from chainsim import Closure, Device
 
 from ..margins import WELL_SHARE
-from ..plan import ChainState, Ramp, Tone, ToneRamp
-from ..waves.walking import TONES_GOOD
-from ..waves.wave_fit import GOOD
-from . import jets
+from ..operating_point import OperatingPoint
+from ..plan import Ramp
 from .fall import find_fall
 from .joining import as_tone
 from .limits import WayLimits
 from .rise import find_way
-from .slow import Sounding, slow_fall, slow_rise
+from .slow import slow_fall, slow_rise
 from .tones import quick_rise
 
-__all__ = ["BUDGET", "enter_wave", "leave_wave", "limits_of"]
-
-Floats = NDArray[np.float64]
+__all__ = ["BUDGET", "enter_tones", "enter_wave", "leave_wave", "limits_of"]
 
 # Slopes a search for a way may take, about 10 ms each.
 BUDGET = 150
-# Single actuators go any way that is smooth: its length in periods, its smoothness, and its nodes.
-PERIODS, SMOOTHNESS, NODES = 40, 5, 161
 
 
-def enter_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
-    """From rest to a wave; `moves` where lam may differ on the way from what it is in the end."""
-    if device.chain_length == 1:
-        return _single(device, state, rises=True)
+def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: float) -> Ramp:
+    """From rest to a wave of one tone.
+
+    Parameters
+    ----------
+    moves : where lam may differ on the way from what it is in the end. tolerance : of what is waited for where no quick
+        way is found, relative to the largest amplitude.
+    """
     lacking = ""
-    if not state.tones and device.coupling.closure is Closure.OPEN:
+    if device.coupling.closure is Closure.OPEN:
         ramp = find_way(
-            device.chain, epsilon=state.epsilon, lam=state.lam, omega=state.omega, phasor=state.phasor,
+            device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
             limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
         )  # fmt: skip
         if not ramp.lacking:
             return ramp
         lacking = ramp.lacking
-    ramp = slow_rise(device, _sounding(state), TONES_GOOD if state.tones else GOOD)
-    if state.tones and moves and device.coupling.closure is Closure.OPEN:
-        quick = quick_rise(device, _sounding(state), limits_of(device, moves), TONES_GOOD)
-        if quick is not None and (ramp.lacking or quick.duration_s < ramp.duration_s):
-            return quick
+    ramp = slow_rise(device, point, tolerance)
     return ramp if not (ramp.lacking and lacking) else _lacking(ramp, lacking)
 
 
-def leave_wave(device: Device, state: ChainState, moves: bool) -> Ramp:
-    """From a wave to rest, the drive among the ramp's tones."""
-    if device.chain_length == 1:
-        return as_tone(_single(device, state, rises=False), state.omega)
-    if state.tones or device.coupling.closure is not Closure.OPEN:
-        return slow_fall(device, _sounding(state), moves)
+def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
+    """From a wave of one tone to rest, the drive among the ramp's tones."""
+    if device.coupling.closure is not Closure.OPEN:
+        return slow_fall(device, point, moves)
     ramp = find_fall(
-        device.chain, epsilon=state.epsilon, lam=state.lam, omega=state.omega, phasor=state.phasor,
+        device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
     )  # fmt: skip
-    return as_tone(ramp, state.omega)
+    return as_tone(ramp, point.omega)
+
+
+def enter_tones(device: Device, point: OperatingPoint, moves: bool, tolerance: float) -> Ramp:
+    """From rest to a wave of several tones; as `enter_wave`."""
+    ramp = slow_rise(device, point, tolerance)
+    if moves and device.coupling.closure is Closure.OPEN:
+        quick = quick_rise(device, point, limits_of(device, moves), tolerance)
+        if quick is not None and (ramp.lacking or quick.duration_s < ramp.duration_s):
+            return quick
+    return ramp
 
 
 def _lacking(ramp: Ramp, lacking: str) -> Ramp:
@@ -83,31 +81,3 @@ def limits_of(device: Device, moves: bool) -> WayLimits:
         slew_per_s=device.amplifier.slew_v_per_s * device.epsilon_per_volt,
         well_share=WELL_SHARE,
     )
-
-
-def _sounding(state: ChainState) -> Sounding:
-    return Sounding((Tone(state.omega, state.epsilon, state.phasor), *state.tones), state.lam, state.margins.multiplier)
-
-
-def _single(device: Device, state: ChainState, *, rises: bool) -> Ramp:
-    """One actuator follows a smooth step times its motion; the drive is what the equation asks for on the way.
-
-    A tone c s(tau) takes ``(1 - omega^2 + i delta omega) c s + (2 i omega + delta) c s' + c s''`` and, of the cubic
-    term, what it takes in the end times s^3.
-    """
-    duration = 2 * math.pi * PERIODS
-    blend = jets.smoothstep(SMOOTHNESS, NODES, 4)
-    s0, s1, s2, s3 = (blend[k] * math.factorial(k) * duration**-k for k in range(4))
-    if not rises:
-        s0, s1, s2, s3 = 1 - s0, -s1, -s2, -s3
-    tones = []
-    for tone in _sounding(state).tones:
-        phasor = complex(tone.phasor[0])
-        stage, drag = 1 - tone.omega**2 + 1j * device.delta * tone.omega, 2j * tone.omega + device.delta
-        cubic = tone.epsilon - stage * phasor
-        envelope = phasor * (stage * s0 + drag * s1 + s2) + cubic * s0**3
-        slope = phasor * (stage * s1 + drag * s2 + s3) + 3 * cubic * s0**2 * s1
-        tones.append(ToneRamp(tone.omega, envelope, slope * device.tau_per_s))
-    first, *others = tones
-    t_s = np.linspace(0.0, duration / device.tau_per_s, NODES)
-    return Ramp(t_s=t_s, epsilon=first.epsilon, epsilon_slope=first.epsilon_slope, tones=tuple(others))

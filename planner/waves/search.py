@@ -7,7 +7,8 @@ import numpy as np
 from chainsim import Chain, Setting, solve
 
 from ..closed_forms.links import drive_for
-from ..closed_forms.wave_fit import Freedom, Hold, Wanted
+from ..closed_forms.wave_fit import Freedom, MotionTarget
+from ..operating_point import OperatingPoint
 
 __all__ = ["search"]
 
@@ -18,7 +19,7 @@ WEAKEST = 1e-3
 TOL = 1e-3
 
 
-def search(chain: Chain, wanted: Wanted, freedom: Freedom) -> list[Hold]:
+def search(chain: Chain, wanted: MotionTarget, freedom: Freedom) -> list[OperatingPoint]:
     """The settings of a random sweep that come nearest to the wish; links log-uniform, frequencies uniform."""
     rng = np.random.default_rng(SEED)
     low = max(freedom.lam_min, WEAKEST * freedom.lam_max, 1e-6)
@@ -31,4 +32,4 @@ def search(chain: Chain, wanted: Wanted, freedom: Freedom) -> list[Hold]:
     turn = np.exp(1j * np.angle(np.sum(np.conj(phasor) * wanted.phasor * wanted.phased, axis=1)))
     merit = np.sum(wanted.residual(phasor * turn[:, None]) ** 2, axis=1)
     best = np.argsort(np.where(np.isfinite(merit), merit, np.inf), kind="stable")[:KEPT]
-    return [Hold(complex(epsilon[i] * turn[i]), lam[i], float(omega[i])) for i in best]
+    return [OperatingPoint(complex(epsilon[i] * turn[i]), lam[i], float(omega[i])) for i in best]

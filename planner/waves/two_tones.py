@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Closure
 
-__all__ = ["MAIN", "ORDERS", "TwoTones", "apart", "two_tones"]
+__all__ = ["MAIN", "ORDERS", "TwoToneWave", "apart", "two_tones"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -34,7 +34,7 @@ STEPS, MET, DIFFERENCE = 30, 1e-12, 1e-7
 
 
 @dataclass(frozen=True)
-class TwoTones:
+class TwoToneWave:
     """A wave of two tones along a chain.
 
     Attributes
@@ -61,7 +61,7 @@ class TwoTones:
         return float(self.omega[MAIN + 1] - self.omega[MAIN])
 
 
-def apart(chain: Chain, *, amplitude: float, width: float, spacing: float) -> TwoTones:
+def apart(chain: Chain, *, amplitude: float, width: float, spacing: float) -> TwoToneWave:
     """Two tones of this amplitude each on single actuators, which take any spacing: no combination of them moves.
 
     Parameters
@@ -72,10 +72,10 @@ def apart(chain: Chain, *, amplitude: float, width: float, spacing: float) -> Tw
     middle = math.sqrt(max(1 + 2.25 * chain.beta * amplitude**2, 0.1)) - spacing / 2
     phasor = np.where((ORDERS == 0) | (ORDERS == 1), amplitude, 0.0).astype(np.complex128)
     parts = _Parts(0.0, np.asarray(middle + spacing * ORDERS), np.asarray((math.pi - step) / 2 + step * ORDERS), phasor)
-    return TwoTones(parts.lam, parts.omega, parts.lag, _drive(chain, parts), phasor)
+    return TwoToneWave(parts.lam, parts.omega, parts.lag, _drive(chain, parts), phasor)
 
 
-def two_tones(chain: Chain, *, amplitude: float, width: float, lam: float | None = None) -> TwoTones | None:
+def two_tones(chain: Chain, *, amplitude: float, width: float, lam: float | None = None) -> TwoToneWave | None:
     """The wave of two tones of this amplitude each; None where Newton's method finds none.
 
     Parameters
@@ -97,7 +97,7 @@ def two_tones(chain: Chain, *, amplitude: float, width: float, lam: float | None
     epsilon = _drive(chain, parts)
     if chain.closure is Closure.RING:
         epsilon = epsilon + parts.lam * (1 - np.exp(-1j * parts.lag * (chain.n - 1))) * parts.phasor
-    return TwoTones(parts.lam, parts.omega, parts.lag, epsilon, parts.phasor)
+    return TwoToneWave(parts.lam, parts.omega, parts.lag, epsilon, parts.phasor)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +12,16 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain
+from ..family import RisingFamily
 from ..margins import lacking_of, slew_of
-from ..plan import ChainState, Margins, Tone
-from ..wish import ChainWish
-from .two_tones import MAIN, ORDERS, TwoTones, apart, two_tones
+from ..operating_point import Margins, OperatingPoint, PointTone
+from ..plan import Ramp
+from ..targets import ChainTarget, WalkingTarget
+from ..transitions.slow import slow_fall
+from ..transitions.waves import enter_tones
+from .two_tones import MAIN, ORDERS, TwoToneWave, apart, two_tones
 
-__all__ = ["TONES_GOOD", "walking_rate_hz", "walking_state"]
+__all__ = ["TONES_GOOD", "Walks", "walking_rate_hz", "walking_state"]
 
 Floats = NDArray[np.float64]
 
@@ -30,41 +35,60 @@ HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
 NARROWEST = 1.01
 
 
-def walking_state(device: Device, wish: ChainWish) -> ChainState:
-    """The settings for a wave of two tones of half the wished amplitude; the nearest where they cannot be made."""
-    level, lam = float(wish.amplitude.max()), None if math.isnan(wish.lam) else wish.lam
-    if np.ptp(wish.amplitude[wish.weight > 0]) > 0:
-        return _nothing(device, wish, "bars walk with one amplitude along a chain; it lacks a drive for every actuator")
-    found, share = _found(device, level, wish, lam), 1.0
+class Walks(RisingFamily):
+    """Two tones under one lam."""
+
+    def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """One by one."""
+        return [walking_state(self.device, target) for target in targets if isinstance(target, WalkingTarget)]
+
+    def enter(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The slow way, or over strong links."""
+        return enter_tones(self.device, point, moves, TONES_GOOD)
+
+    def leave(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The drive is taken away."""
+        return slow_fall(self.device, point, moves)
+
+
+def walking_state(device: Device, target: WalkingTarget) -> OperatingPoint:
+    """The settings for a wave of two tones of half the wanted amplitude; the nearest where they cannot be made."""
+    level = float(target.levels.max())
+    if np.ptp(target.levels[target.weights > 0]) > 0:
+        return _nothing(
+            device, target, "bars walk with one amplitude along a chain; it lacks a drive for every actuator"
+        )
+    found, share = _found(device, level, target), 1.0
     if found is None:
-        share, found = _lower(device, level, wish, lam)
+        share, found = _lower(device, level, target)
     if found is None:
-        return _nothing(device, wish, "no two tones stand under one lam; it lacks range of lam")
-    state = _state(device, wish, found)
-    lacking = _lacking(device, wish, found, share) or lacking_of(state.margins)
+        return _nothing(device, target, "no two tones stand under one lam; it lacks range of lam")
+    state = _state(device, target, found)
+    lacking = _lacking(device, target, found, share) or lacking_of(state.margins)
     return replace(state, outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking)
 
 
-def walking_rate_hz(device: Device, state: ChainState) -> float:
+def walking_rate_hz(device: Device, state: OperatingPoint) -> float:
     """Bars that pass an actuator in a second in the state of a walk."""
     other = next(tone for tone in state.tones if not tone.side)
     return (other.omega - state.omega) * device.f0_hz
 
 
-def _found(device: Device, level: float, wish: ChainWish, lam: float | None) -> TwoTones | None:
+def _found(device: Device, level: float, target: WalkingTarget) -> TwoToneWave | None:
     """Two tones under a lam that can be set."""
     chain, coupling = device.chain, device.coupling
     amplitude = level * device.full_scale / 2
-    spacing = wish.rate_hz / device.f0_hz
-    width = wish.width
-    if math.isnan(width):
+    lam, spacing = target.lam, None if target.rate_hz is None else target.rate_hz / device.f0_hz
+    width = target.width
+    if width is None:
+        assert spacing is not None
         width = max(NARROWEST, math.pi / 2 / math.atan(spacing / device.delta))
+        if device.chain_length > 1:
+            width = _fitted(device, amplitude, width, spacing)
     if device.chain_length == 1:
-        if math.isnan(spacing):
+        if spacing is None:
             return two_tones(chain, amplitude=amplitude, width=width)
         return apart(chain, amplitude=amplitude, width=width, spacing=spacing)
-    if math.isnan(wish.width):
-        width = _fitted(device, amplitude, width, spacing)
     if lam is None and coupling.lam.min < coupling.lam.max:
         free = two_tones(chain, amplitude=amplitude, width=width)
         if free is None:
@@ -91,11 +115,11 @@ def _fitted(device: Device, amplitude: float, width: float, spacing: float) -> f
     return width
 
 
-def _lower(device: Device, level: float, wish: ChainWish, lam: float | None) -> tuple[float, TwoTones | None]:
+def _lower(device: Device, level: float, target: WalkingTarget) -> tuple[float, TwoToneWave | None]:
     good, bad, kept = 0.0, 1.0, None
     for _ in range(HALVINGS):
         middle = (good + bad) / 2
-        found = _found(device, level * middle, wish, lam)
+        found = _found(device, level * middle, target)
         if found is None:
             bad = middle
         else:
@@ -103,15 +127,15 @@ def _lower(device: Device, level: float, wish: ChainWish, lam: float | None) -> 
     return good, kept
 
 
-def _lacking(device: Device, wish: ChainWish, found: TwoTones, share: float) -> str:
+def _lacking(device: Device, target: WalkingTarget, found: TwoToneWave, share: float) -> str:
     if share < 1.0:
         part = f"{100 * share:.0f} % of this amplitude"
         return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta)"
-    if abs(found.width / wish.width - 1) > SAME:
+    if target.width is not None and abs(found.width / target.width - 1) > SAME:
         return f"its lam makes bars {found.width:.3g} actuators wide; it lacks range of lam"
     rate_hz = found.spacing * device.f0_hz
-    if abs(rate_hz / wish.rate_hz - 1) > SAME:
-        if math.isnan(wish.width):
+    if target.rate_hz is not None and abs(rate_hz / target.rate_hz - 1) > SAME:
+        if target.width is None:
             return f"its lam makes bars walk at {rate_hz:.3g} Hz; it lacks range of lam"
         return f"bars of this width walk at {rate_hz:.3g} Hz; it lacks a drive for every actuator"
     if found.omega[MAIN] < device.omega.min or found.omega[MAIN + 1] > device.omega.max:
@@ -119,13 +143,13 @@ def _lacking(device: Device, wish: ChainWish, found: TwoTones, share: float) -> 
     return ""
 
 
-def _state(device: Device, wish: ChainWish, found: TwoTones) -> ChainState:
+def _state(device: Device, target: WalkingTarget, found: TwoToneWave) -> OperatingPoint:
     n = device.chain_length
-    lags = np.outer(found.lag, wish.place + np.arange(n))
+    lags = np.outer(found.lag, target.place + np.arange(n))
     phasors = found.phasor[:, None] * np.exp(-1j * lags)
-    drives = found.epsilon * np.exp(-1j * found.lag * wish.place)
+    drives = found.epsilon * np.exp(-1j * found.lag * target.place)
     tones = [
-        Tone(float(omega), complex(drive), phasor, side)
+        PointTone(float(omega), complex(drive), phasor, side)
         for omega, drive, phasor, side in zip(found.omega, drives, phasors, SIDE, strict=True)
     ]
     first, *others = sorted(tones, key=lambda tone: tone.side)
@@ -136,15 +160,15 @@ def _state(device: Device, wish: ChainWish, found: TwoTones) -> ChainState:
     # The tones with all side tones in line, and the third harmonic that goes with them.
     highest = float(np.abs(found.phasor).sum())
     highest += abs(device.beta) * highest**3 / 32
-    return ChainState(
-        target=wish.amplitude,
+    return OperatingPoint(
+        target=target.levels,
         epsilon=first.epsilon,
         lam=lam,
         bias=np.zeros(n),
         omega=first.omega,
         phasor=first.phasor,
         mean=np.zeros(n),
-        error=float(np.abs((reached - wish.amplitude)[wish.weight > 0]).max()),
+        error=float(np.abs((reached - target.levels)[target.weights > 0]).max()),
         margins=Margins(
             volts=together / device.epsilon_max,
             well=highest / device.escape_amplitude,
@@ -156,11 +180,11 @@ def _state(device: Device, wish: ChainWish, found: TwoTones) -> ChainState:
     )
 
 
-def _nothing(device: Device, wish: ChainWish, lacking: str) -> ChainState:
+def _nothing(device: Device, target: WalkingTarget, lacking: str) -> OperatingPoint:
     n = device.chain_length
     silence = np.zeros(n, dtype=np.complex128)
-    return ChainState(
-        target=wish.amplitude, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
-        phasor=silence, mean=np.zeros(n), error=float(wish.amplitude.max()), margins=Margins(0.0, 0.0),
+    return OperatingPoint(
+        target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
+        phasor=silence, mean=np.zeros(n), error=float(target.levels.max()), margins=Margins(0.0, 0.0),
         outcome=Outcome.UNREACHABLE, lacking=lacking,
     )  # fmt: skip

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 
 from ..closed_forms.nearest import nearest_geometric
-from ..closed_forms.wave_fit import Fitted, Freedom, Hold, Wanted, fit
-from ..wish import ChainWish
+from ..closed_forms.wave_fit import FittedPoint, Freedom, MotionTarget, fit
+from ..operating_point import OperatingPoint
+from ..targets import WaveTarget
 from .search import search
-from .wave_forms import Wave, lag_and_ratio, wave_for, wave_on
+from .wave_forms import lag_and_ratio, wave_for, wave_on
 
 __all__ = ["GOOD", "WaveFit"]
 
@@ -29,7 +30,7 @@ FREE_LAGS = tuple(math.radians(degrees) for degrees in (120.0, 90.0, 150.0))
 LEAST_PART = 1e-3
 # Farther than this from a shape that can be made, relative to the largest amplitude, no refinement makes it.
 FAR = 0.2
-# Halvings in the search for the largest share of the wish that stands.
+# Halvings in the search for the largest share of the target that stands.
 HALVINGS = 5
 
 
@@ -37,86 +38,81 @@ HALVINGS = 5
 class _Guess:
     """Settings to begin with, and the phasors they are meant for."""
 
-    hold: Hold
-    wanted: Wanted
+    point: OperatingPoint
+    wanted: MotionTarget
 
 
 @dataclass(frozen=True)
 class WaveFit:
-    """The task for one wish on one device."""
+    """The task for one target on one device."""
 
     device: Device
-    wish: ChainWish
-
-    @property
-    def lam(self) -> float | None:
-        """The lam that other chains give."""
-        return None if math.isnan(self.wish.lam) else self.wish.lam
+    target: WaveTarget
 
     @cached_property
     def scale(self) -> float:
-        """The largest amplitude wished for, dimensionless."""
-        return float(self.wish.amplitude.max()) * self.device.full_scale
+        """The largest amplitude wanted, dimensionless."""
+        return float(self.target.levels.max()) * self.device.full_scale
 
     @cached_property
     def phased(self) -> NDArray[np.bool_]:
-        """Where a phase is wished for."""
-        return np.asarray(~np.isnan(self.wish.phase))
+        """Where a phase is wanted."""
+        return np.asarray(~np.isnan(self.target.phases))
 
     @cached_property
     def backwards(self) -> bool:
-        """Whether the wished wave runs towards the drive, or stands."""
+        """Whether the wanted wave runs towards the drive, or stands."""
         several = int(np.count_nonzero(self.phased)) > 1
         return several and not 0 < lag_and_ratio(self.wanted(1.0).phasor * self.phased)[0] < math.pi
 
     @cached_property
     def jagged(self) -> bool:
-        """Whether amplitudes alone are wished for that are far from any one lam can make."""
+        """Whether amplitudes alone are wanted that are far from any one lam can make."""
         if np.count_nonzero(self.phased) > 1 or self.device.coupling.scope == "link":
             return False
         wanted = np.abs(self.wanted(1.0).phasor)
         first, ratio = nearest_geometric(self.device, wanted, self.scale)
-        away = np.abs(first * ratio ** np.arange(len(wanted)) - wanted) * self.wish.weight
+        away = np.abs(first * ratio ** np.arange(len(wanted)) - wanted) * self.target.weights
         return bool(away.max() > FAR * self.scale)
 
     @cached_property
     def freedom(self) -> Freedom:
         """One lam for the chain, or a given one."""
         coupling, omega = self.device.coupling, self.device.omega
-        given = self.lam is not None or coupling.lam.min == coupling.lam.max
+        given = self.target.lam is not None or coupling.lam.min == coupling.lam.max
         return Freedom(0 if given else 1, coupling.lam.min, coupling.lam.max, omega.min, omega.max)
 
-    def wanted(self, share: float) -> Wanted:
-        """`share` of the wish."""
-        phasor = share * self.wish.amplitude * self.device.full_scale * np.exp(1j * np.nan_to_num(self.wish.phase))
-        return Wanted(phasor, self.phased, self.wish.weight)
+    def wanted(self, share: float) -> MotionTarget:
+        """`share` of the target."""
+        phasor = share * self.target.levels * self.device.full_scale * np.exp(1j * np.nan_to_num(self.target.phases))
+        return MotionTarget(phasor, self.phased, self.target.weights)
 
-    def stands(self, found: Fitted) -> bool:
+    def stands(self, found: FittedPoint) -> bool:
         """Whether settings hold what they are meant for, and it is stable."""
         return found.outcome is Outcome.OK and found.error <= GOOD * self.scale
 
-    def best(self, share: float) -> Fitted:
-        """The nearest found for `share` of the wish."""
+    def best(self, share: float) -> FittedPoint:
+        """The nearest found for `share` of the target."""
         wanted, freedom, chain = self.wanted(share), self.freedom, self.device.chain
         guesses = self._guesses(wanted)
         if self.backwards or self.jagged:
             still = replace(freedom, lam=0, omega=False)
-            return self._least([fit(chain, guess.wanted, guess.hold, still) for guess in guesses], wanted)
-        tries: list[Fitted] = []
+            return self._least([fit(chain, guess.wanted, guess.point, still) for guess in guesses], wanted)
+        tries: list[FittedPoint] = []
         for guess in guesses:
-            tries.append(self._rounded(fit(chain, guess.wanted, guess.hold, freedom), guess.wanted, freedom))
+            tries.append(self._rounded(fit(chain, guess.wanted, guess.point, freedom), guess.wanted, freedom))
             if self.stands(self._least(tries, wanted)):
                 break
         found = self._least(tries, wanted)
         if not self.stands(found) and guesses[0].wanted is not wanted and np.isfinite(found.error):
-            freer = fit(chain, wanted, found.hold, freedom)
+            freer = fit(chain, wanted, found.point, freedom)
             found = self._least([found, self._rounded(freer, wanted, freedom)], wanted)
-        if not self.stands(found) and self.device.coupling.scope == "link" and self.lam is None:
+        if not self.stands(found) and self.device.coupling.scope == "link" and self.target.lam is None:
             found = self._least([found, *self._link_by_link(found, wanted)], wanted)
         return found
 
-    def lower(self) -> tuple[float, Fitted] | None:
-        """The largest share of the wish found to stand, and its settings; None where none does."""
+    def lower(self) -> tuple[float, FittedPoint] | None:
+        """The largest share of the target found to stand, and its settings; None where none does."""
         good, bad, kept = 0.0, 1.0, None
         for _ in range(HALVINGS):
             middle = (good + bad) / 2
@@ -127,33 +123,33 @@ class WaveFit:
                 bad = middle
         return None if kept is None else (good, kept)
 
-    def _least(self, found: list[Fitted], wanted: Wanted) -> Fitted:
+    def _least(self, found: list[FittedPoint], wanted: MotionTarget) -> FittedPoint:
         """The first that stands, else that with the least error."""
         real = [replace(one, error=wanted.error(one.phasor)) if np.isfinite(one.error) else one for one in found]
         return next((one for one in real if self.stands(one)), min(real, key=lambda one: one.error))
 
-    def _link_by_link(self, found: Fitted, wanted: Wanted) -> list[Fitted]:
+    def _link_by_link(self, found: FittedPoint, wanted: MotionTarget) -> list[FittedPoint]:
         """Every link for itself: from what was found for them all, and from a search."""
         each, chain = replace(self.freedom, lam=self.device.chain_length - 1), self.device.chain
         # Behind the last actuator that is to move, nothing is passed on.
         passing = np.arange(chain.n - 1) < int(np.flatnonzero(wanted.phasor)[-1])
-        starts = [replace(found.hold, lam=np.where(passing, found.hold.lam, each.lam_min))]
+        starts = [replace(found.point, lam=np.where(passing, found.point.lam, each.lam_min))]
         starts = starts if np.isfinite(found.error) else []
         tries = [fit(chain, wanted, start, each) for start in starts]
         if not any(self.stands(one) for one in tries) and chain.feed_forward:
             tries += [fit(chain, wanted, start, each) for start in search(chain, wanted, each)]
         return [self._rounded(one, wanted, each) for one in tries]
 
-    def _rounded(self, found: Fitted, wanted: Wanted, freedom: Freedom) -> Fitted:
+    def _rounded(self, found: FittedPoint, wanted: MotionTarget, freedom: Freedom) -> FittedPoint:
         """With every lam one that can be set, drive and frequency refitted."""
         coupling = self.device.coupling
         if not coupling.lam_step or not freedom.lam or not np.isfinite(found.error):
             return found
-        steps = np.rint((found.hold.lam - coupling.lam.min) / coupling.lam_step)
-        hold = replace(found.hold, lam=coupling.lam.min + coupling.lam_step * steps)
-        return fit(self.device.chain, wanted, hold, replace(freedom, lam=0))
+        steps = np.rint((found.point.lam - coupling.lam.min) / coupling.lam_step)
+        point = replace(found.point, lam=coupling.lam.min + coupling.lam_step * steps)
+        return fit(self.device.chain, wanted, point, replace(freedom, lam=0))
 
-    def _guesses(self, wanted: Wanted) -> list[_Guess]:
+    def _guesses(self, wanted: MotionTarget) -> list[_Guess]:
         """From the closed forms; where phases are free they are given, because a valley is slow to walk along."""
         chain, most = self.device.chain, self.freedom.lam_max
         if np.count_nonzero(self.phased) > 1:
@@ -164,18 +160,16 @@ class WaveFit:
             lag = float(np.clip(lag, least, math.pi - least))
             waves = self._waves(abs(wanted.phasor[0]), ratio, (lag,))
             if not self.backwards:
-                return [_Guess(self._hold(wave), wanted) for wave in waves]
+                return [_Guess(wave, wanted) for wave in waves]
         else:
             first, ratio = nearest_geometric(self.device, np.abs(wanted.phasor), wanted.scale)
             waves = self._waves(first, ratio, FREE_LAGS)
         return [self._own(wave, ratio, wanted) for wave in waves]
 
-    def _own(self, wave: Wave, ratio: float, wanted: Wanted) -> _Guess:
-        """A wave as the wish: its own phases, and its own amplitudes."""
-        chain, hold = self.device.chain, self._hold(wave)
-        stage = wave.lam / complex(
-            1 - wave.omega**2 + 0.75 * chain.beta * wanted.scale**2 + wave.lam, chain.delta * wave.omega
-        )
+    def _own(self, wave: OperatingPoint, ratio: float, wanted: MotionTarget) -> _Guess:
+        """A wave as it is wanted: its own phases, and its own amplitudes."""
+        chain, lam = self.device.chain, float(wave.lam[0])
+        stage = lam / complex(1 - wave.omega**2 + 0.75 * chain.beta * wanted.scale**2 + lam, chain.delta * wave.omega)
         first = wanted.phasor[np.argmax(np.abs(wanted.phasor))]
         lags = np.exp(1j * np.angle(stage) * np.arange(chain.n)) if stage else np.ones(chain.n)
         size = np.abs(wanted.phasor)
@@ -183,18 +177,15 @@ class WaveFit:
             geometric = nearest_geometric(self.device, size, wanted.scale)
             size = geometric.first * geometric.ratio ** np.arange(chain.n)
         shape = size * lags * np.exp(1j * np.angle(first))
-        return _Guess(hold, Wanted(shape, np.ones(chain.n, dtype=np.bool_), wanted.weight))
+        return _Guess(wave, MotionTarget(shape, np.ones(chain.n, dtype=np.bool_), wanted.weight))
 
-    def _hold(self, wave: Wave) -> Hold:
-        return Hold(wave.epsilon, np.full(self.device.chain_length - 1, wave.lam), wave.omega)
-
-    def _waves(self, first: float, ratio: float, lags: tuple[float, ...]) -> list[Wave]:
+    def _waves(self, first: float, ratio: float, lags: tuple[float, ...]) -> list[OperatingPoint]:
         chain, amplitude = self.device.chain, max(first, LEAST_PART * self.scale)
         if self.freedom.lam:
             ratio = ratio if ratio > LEAST_PART else 0.0
             return [wave_for(chain, amplitude=amplitude, lag=lag, ratio=ratio) for lag in lags]
-        given = self.device.coupling.lam.min if self.lam is None else self.lam
+        given = self.device.coupling.lam.min if self.target.lam is None else self.target.lam
         found = [wave_on(chain, amplitude=amplitude, lam=given, long=long) for long in (True, False)]
         return [wave for wave in found if wave is not None] or [
-            replace(wave_for(chain, amplitude=amplitude, lag=math.pi / 2), lam=given)
+            replace(wave_for(chain, amplitude=amplitude, lag=math.pi / 2), lam=np.full(chain.n - 1, given))
         ]

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Chain, Closure
 
-__all__ = ["Wave", "lag_and_ratio", "wave_for", "wave_on"]
+from ..operating_point import OperatingPoint
+
+__all__ = ["lag_and_ratio", "wave_for", "wave_on"]
 
 Complexes = NDArray[np.complex128]
 
 
-@dataclass(frozen=True)
-class Wave:
-    """The settings of a wave whose first actuator's phasor is real: drive phasor, one lam, frequency over f0."""
-
-    epsilon: complex
-    lam: float
-    omega: float
-
-
-def wave_for(chain: Chain, *, amplitude: float, lag: float, ratio: float = 1.0) -> Wave:
-    """Settings for ``A_m = amplitude ratio^m e^{-i m lag}``, in one harmonic.
+def wave_for(chain: Chain, *, amplitude: float, lag: float, ratio: float = 1.0) -> OperatingPoint:
+    """The point with ``A_m = amplitude ratio^m e^{-i m lag}``, in one harmonic.
 
     ``lam = r delta omega / sin lag`` and ``omega^2 = 1 + (3/4) beta a^2 + lam (1 - cos(lag) / r)`` (physics.md
     section 2), with a^2 the mean over the actuators behind the first; exact where r = 1 or beta = 0.
@@ -43,10 +35,11 @@ def wave_for(chain: Chain, *, amplitude: float, lag: float, ratio: float = 1.0) 
     pull = chain.delta * (ratio - math.cos(lag)) / math.sin(lag)
     omega = (pull + math.sqrt(pull**2 + 4 * max(stiff, 0.0))) / 2
     lam = ratio * chain.delta * omega / math.sin(lag)
-    return Wave(_drive(chain, amplitude * ratio**steps * np.exp(-1j * lag * steps), lam, omega), lam, omega)
+    epsilon = _drive(chain, amplitude * ratio**steps * np.exp(-1j * lag * steps), lam, omega)
+    return OperatingPoint(epsilon, np.full(chain.n - 1, lam), omega)
 
 
-def wave_on(chain: Chain, *, amplitude: float, lam: float, long: bool) -> Wave | None:
+def wave_on(chain: Chain, *, amplitude: float, lam: float, long: bool) -> OperatingPoint | None:
     """Settings for a wave of equal amplitudes under a given lam: of the two lags, pi apart together, the shorter or
     the longer; None where lam is too small for a gain of 1.
     """

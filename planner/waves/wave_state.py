@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,16 @@ from chainsim import Closure, Device, Outcome
 
 from ..closed_forms.links import detuning_gain
 from ..closed_forms.nearest import nearest_geometric
-from ..closed_forms.wave_fit import Fitted
+from ..closed_forms.wave_fit import FittedPoint
+from ..family import RisingFamily
 from ..margins import converter_error, lacking_of, slew_of, well_of
-from ..plan import ChainState, Margins
-from ..wish import ChainWish
+from ..operating_point import Margins, OperatingPoint
+from ..plan import Ramp
+from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
+from ..transitions.waves import enter_wave, leave_wave
 from .wave_fit import GOOD, WaveFit
 
-__all__ = ["wave_state"]
+__all__ = ["Waves", "wave_state"]
 
 Floats = NDArray[np.float64]
 
@@ -28,13 +32,47 @@ ROUNDING = 2.0
 UNEVEN = 0.1
 
 
-def wave_state(device: Device, wish: ChainWish) -> ChainState:
+class Waves(RisingFamily):
+    """Waves of one tone, and amplitudes where the device has no better way: the nearest that one lam can make."""
+
+    def held(self, target: ChainTarget, started: bool) -> ChainTarget:
+        """Amplitudes are a wave of any phases, unless they are rest."""
+        if not isinstance(target, AmplitudeTarget) or target.resting:
+            return target
+        n = len(target.amplitude)
+        return WaveTarget(target.amplitude, phase=(None,) * n, weight=(1.0,) * n)
+
+    def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """One by one."""
+        return [self._point(target) for target in targets]
+
+    def _point(self, target: ChainTarget) -> OperatingPoint:
+        return wave_state(self.device, target) if isinstance(target, WaveTarget) else _rest(self.device, target)
+
+    def enter(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The quickest way that is found."""
+        return enter_wave(self.device, point, moves, GOOD)
+
+    def leave(self, point: OperatingPoint, moves: bool) -> Ramp:
+        """The quickest way that is found."""
+        return leave_wave(self.device, point, moves)
+
+
+def _rest(device: Device, target: ChainTarget) -> OperatingPoint:
+    n = device.chain_length
+    return OperatingPoint(
+        target=target.levels, epsilon=0j, lam=np.full(n - 1, device.coupling.lam.min), bias=np.zeros(n), omega=1.0,
+        phasor=np.zeros(n, dtype=np.complex128), mean=np.zeros(n),
+    )  # fmt: skip
+
+
+def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
     """The settings for a wave, or for amplitudes that one lam can make.
 
-    Where the wish cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
+    Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
     nearest motion of all.
     """
-    task = WaveFit(device, wish)
+    task = WaveFit(device, target)
     found, share = task.best(1.0), 1.0
     near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
     if not task.stands(found) and not near and not task.jagged:
@@ -45,49 +83,49 @@ def wave_state(device: Device, wish: ChainWish) -> ChainState:
 
 @dataclass(frozen=True)
 class _Told:
-    """What was found for `share` of a wish, to be told."""
+    """What was found for `share` of a target, to be told."""
 
     task: WaveFit
-    found: Fitted
+    found: FittedPoint
     share: float
 
-    def state(self) -> ChainState:
+    def state(self) -> OperatingPoint:
         """The state."""
-        task, device, hold = self.task, self.task.device, self.found.hold
+        task, device, point = self.task, self.task.device, self.found.point
         n, known = device.chain_length, bool(np.isfinite(self.found.error))
         phasor = self.found.phasor if known else np.zeros(n, dtype=np.complex128)
-        noise = converter_error(device, hold) if known else 0.0
+        noise = converter_error(device, point) if known else 0.0
         error = task.wanted(1.0).error(phasor) + noise
         margins = self._margins() if known else Margins(0.0, 0.0)
         lacking = self._lacking(error, noise) or lacking_of(margins)
-        return ChainState(
-            target=task.wish.amplitude,
-            epsilon=hold.epsilon,
-            lam=hold.lam,
+        return OperatingPoint(
+            target=task.target.levels,
+            epsilon=point.epsilon,
+            lam=point.lam,
             bias=np.zeros(n),
-            omega=hold.omega,
+            omega=point.omega,
             phasor=phasor,
             mean=np.zeros(n),
             error=error / device.full_scale,
             margins=margins,
             outcome=Outcome.UNREACHABLE if lacking else Outcome.OK,
-            phase=task.wish.phase if np.any(task.phased) else None,
+            phase=task.target.phases if np.any(task.phased) else None,
             lacking=lacking,
         )
 
     def _margins(self) -> Margins:
-        device, hold, found = self.task.device, self.found.hold, self.found
-        gain = detuning_gain(device.chain, np.abs(found.phasor)[None, :], hold.lam[None, :], hold.omega)
+        device, point, found = self.task.device, self.found.point, self.found
+        gain = detuning_gain(device.chain, np.abs(found.phasor)[None, :], point.lam[None, :], point.omega)
         return Margins(
-            volts=abs(hold.epsilon) / device.epsilon_max,
+            volts=abs(point.epsilon) / device.epsilon_max,
             well=well_of(device, found.response),
             noise_gain=float(gain[0]),
-            slew=slew_of(device, abs(hold.epsilon), hold.omega),
+            slew=slew_of(device, abs(point.epsilon), point.omega),
             multiplier=float(np.nan_to_num(np.abs(found.response.multipliers)).max()),
         )
 
     def _lacking(self, error: float, noise: float) -> str:
-        """One clause on what keeps the device from the wish, "" when nothing."""
+        """One clause on what keeps the device from the target, "" when nothing."""
         task, found, scale = self.task, self.found, self.task.scale
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
@@ -105,25 +143,25 @@ class _Told:
 
     def _uneven(self) -> bool:
         """Whether neighbours are to differ as one lam and one drive never let them."""
-        device, target = self.task.device, self.task.wish.amplitude
+        device, levels = self.task.device, self.task.target.levels
         if device.coupling.scope == "link":
             return False
-        near = nearest_geometric(device, target, 1.0)
-        return bool(np.abs(near.first * near.ratio ** np.arange(len(target)) - target).max() > UNEVEN)
+        near = nearest_geometric(device, levels, 1.0)
+        return bool(np.abs(near.first * near.ratio ** np.arange(len(levels)) - levels).max() > UNEVEN)
 
     def _out_of_range(self) -> str:
-        hold, lam, omega = self.found.hold, self.task.device.coupling.lam, self.task.device.omega
+        point, lam, omega = self.found.point, self.task.device.coupling.lam, self.task.device.omega
         # Zero is a link that passes nothing on, which may be wanted; nothing lies below it.
-        low = lam.min > 0 and bool(np.any(hold.lam <= lam.min))
-        if self.task.freedom.lam and (low or np.any(hold.lam >= lam.max)):
+        low = lam.min > 0 and bool(np.any(point.lam <= lam.min))
+        if self.task.freedom.lam and (low or np.any(point.lam >= lam.max)):
             return f"it takes a lam {'below' if low else 'above'} {lam.min:.3g}..{lam.max:.3g}; it lacks range of lam"
-        if not omega.min < hold.omega < omega.max:
+        if not omega.min < point.omega < omega.max:
             return f"it takes a frequency outside {omega.min:g}..{omega.max:g}; it lacks range of omega"
         return ""
 
     def _no_freedom(self) -> str:
         device = self.task.device
-        rounding = device.chain_length * device.coupling.lam_step / max(float(self.found.hold.lam.max()), 1e-9) / 2
+        rounding = device.chain_length * device.coupling.lam_step / max(float(self.found.point.lam.max()), 1e-9) / 2
         if self.found.error < ROUNDING * rounding * self.task.scale:
             return f"lam can only be set in steps of {device.coupling.lam_step:.2g}; it lacks bits of lam"
         shape = "ring" if device.coupling.closure is Closure.RING else "chain"

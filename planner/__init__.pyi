@@ -1,0 +1,91 @@
+from .analysis.climbing import (
+    climb as climb,
+)
+from .analysis.pareto import (
+    ParetoError as ParetoError,
+    ParetoFront as ParetoFront,
+    ParetoPoint as ParetoPoint,
+    front_of as front_of,
+    pareto_of as pareto_of,
+)
+from .analysis.questions import (
+    Question as Question,
+    TradeoffError as TradeoffError,
+    questions_of as questions_of,
+    seconds_words as seconds_words,
+)
+from .analysis.requirement import (
+    Requirement as Requirement,
+    RequirementError as RequirementError,
+    Term as Term,
+    require as require,
+)
+from .analysis.tradeoff import (
+    Tradeoff as Tradeoff,
+    TradeoffChoice as TradeoffChoice,
+    TradeoffRow as TradeoffRow,
+    trade_off as trade_off,
+)
+from .drive import (
+    DriveTone as DriveTone,
+    FirstOrderHold as FirstOrderHold,
+    curve as curve,
+    links_at as links_at,
+    tones_of as tones_of,
+)
+from .errors import (
+    ContrastError as ContrastError,
+    DwellTooShort as DwellTooShort,
+    PlanError as PlanError,
+    SceneDoesNotFit as SceneDoesNotFit,
+)
+from .identification.calibration import (
+    ChainFit as ChainFit,
+    Sweep as Sweep,
+    SweepError as SweepError,
+    fit_chain as fit_chain,
+)
+from .operating_point import (
+    Margins as Margins,
+    OperatingPoint as OperatingPoint,
+    PointTone as PointTone,
+)
+from .outlook import (
+    FrameSpread as FrameSpread,
+    TradePoint as TradePoint,
+)
+from .plan import (
+    FramePlan as FramePlan,
+    Plan as Plan,
+    Ramp as Ramp,
+    ToneRamp as ToneRamp,
+)
+from .robustness.robust import (
+    Accuracy as Accuracy,
+    RobustError as RobustError,
+    RobustPlan as RobustPlan,
+    TradeRow as TradeRow,
+    Trial as Trial,
+    accuracy_needed as accuracy_needed,
+    robust_plan as robust_plan,
+)
+from .robustness.spread import (
+    FrameTarget as FrameTarget,
+    RelativeSpread as RelativeSpread,
+    SpreadError as SpreadError,
+    SpreadReport as SpreadReport,
+    frame_target as frame_target,
+    spread_of as spread_of,
+)
+from .scene_plan import (
+    DEFAULT_CONTRAST_DB as DEFAULT_CONTRAST_DB,
+    plan_scene as plan_scene,
+)
+from .surroundings import (
+    HigherMode as HigherMode,
+    Surroundings as Surroundings,
+    assumed as assumed,
+)
+from .waves.walking import (
+    walking_rate_hz as walking_rate_hz,
+)

@@ -1,0 +1,200 @@
+"""What is wanted of one chain: targets that are equal where what is wanted is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chainsim import Device
+from encoders import TargetPattern
+
+__all__ = ["AmplitudeTarget", "ChainTarget", "WalkingTarget", "WaveTarget", "targets_of"]
+
+Floats = NDArray[np.float64]
+
+# Phases are told apart to so many decimals, so that rows of a plane wave are the same but for a turn.
+PHASE_DECIMALS = 9
+AMPLITUDE_DECIMALS = 12
+
+
+@dataclass(frozen=True)
+class ChainTarget:
+    """What is wanted of one chain of n; a key of dictionaries.
+
+    Attributes
+    ----------
+    amplitude : n numbers, in units of full scale. turn : radians by which the whole motion is turned.
+    """
+
+    amplitude: tuple[float, ...]
+    turn: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        # Once: a target is looked up several times in every frame. What else it has is left to ==.
+        object.__setattr__(self, "_hash", hash((self.amplitude, self.turn)))
+
+    def __hash__(self) -> int:
+        number: int = self.__dict__["_hash"]
+        return number
+
+    @cached_property
+    def levels(self) -> Floats:
+        """The amplitudes as float64, shape (n,), read-only."""
+        return _array(self.amplitude)
+
+    @cached_property
+    def resting(self) -> bool:
+        """Whether nothing is to move."""
+        return not any(self.amplitude)
+
+    @property
+    def unturned(self) -> Self:
+        """The same but for its turn: rows of a plane wave share it."""
+        return replace(self, turn=0.0) if self.turn else self
+
+    def turned(self, turn: float) -> Self:
+        """The same with another turn; rest has none."""
+        return self if self.resting or turn == self.turn else replace(self, turn=turn)
+
+    def under(self, lam: float) -> Self:
+        """The same, with a lam that other chains give; amplitudes at will are made with any."""
+        return self
+
+    @property
+    def key(self) -> bytes:
+        """The target in bytes, for a cache on disk."""
+        return repr(self).encode()
+
+
+@dataclass(frozen=True)
+class AmplitudeTarget(ChainTarget):
+    """Amplitudes, or deflections; any phases will do. All zero is rest."""
+
+    __hash__ = ChainTarget.__hash__
+
+    @classmethod
+    def of(cls, levels: Floats, turn: float = 0.0) -> AmplitudeTarget:
+        """Of amplitudes in an array of shape (n,)."""
+        return cls(tuple(levels.tolist()), turn=turn)
+
+
+@dataclass(frozen=True)
+class WaveTarget(ChainTarget):
+    """Amplitudes with phases, or amplitudes on a device that cannot make them at will.
+
+    Attributes
+    ----------
+    phase : n numbers, radians, None where any will do; the first that is given is 0.
+    weight : n numbers, 0 = don't care. lam : of every link, given by other chains; None where it is free.
+    """
+
+    phase: tuple[float | None, ...]
+    weight: tuple[float, ...]
+    lam: float | None = None
+
+    __hash__ = ChainTarget.__hash__
+
+    @classmethod
+    def of(cls, levels: Floats, phases: Floats, weights: Floats, turn: float = 0.0) -> WaveTarget:
+        """Of arrays of shape (n,); a phase of NaN is one that does not matter."""
+        phase = (None if np.isnan(one) else one for one in phases.tolist())
+        return cls(tuple(levels.tolist()), tuple(phase), tuple(weights.tolist()), turn=turn)
+
+    @cached_property
+    def phases(self) -> Floats:
+        """The phases as float64, shape (n,), NaN where any will do; read-only."""
+        return _array(tuple(np.nan if one is None else one for one in self.phase))
+
+    @cached_property
+    def weights(self) -> Floats:
+        """The weights as float64, shape (n,), read-only."""
+        return _array(self.weight)
+
+    def under(self, lam: float) -> WaveTarget:
+        """The same wave over links of a given lam."""
+        return replace(self, lam=lam)
+
+
+@dataclass(frozen=True)
+class WalkingTarget(ChainTarget):
+    """Bars that walk along a chain.
+
+    Attributes
+    ----------
+    weight : n numbers, 0 = don't care.
+    width : of a bar in actuators; None where it follows from the rate. rate_hz : bars that pass in a second; None where
+        that follows from the width. place : the column of the chain's first actuator.
+    lam : of every link, given by other chains; None where it is free.
+
+    Raises
+    ------
+    ValueError
+        When neither a width nor a rate is given.
+    """
+
+    weight: tuple[float, ...]
+    width: float | None = None
+    rate_hz: float | None = None
+    place: int = 0
+    lam: float | None = None
+
+    __hash__ = ChainTarget.__hash__
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.width is None and self.rate_hz is None:
+            raise ValueError("walking bars: expected a width, a rate or both")
+
+    @cached_property
+    def weights(self) -> Floats:
+        """The weights as float64, shape (n,), read-only."""
+        return _array(self.weight)
+
+    def under(self, lam: float) -> WalkingTarget:
+        """The same bars over links of a given lam."""
+        return replace(self, lam=lam)
+
+
+def _array(numbers: tuple[float, ...]) -> Floats:
+    array: Floats = np.array(numbers, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def targets_of(pattern: TargetPattern, device: Device) -> Iterator[ChainTarget]:
+    """What a pattern wants of every chain of `device`, row by row."""
+    n = device.chain_length
+    size, angle = np.abs(pattern.amplitude), np.angle(pattern.amplitude)
+    weight = np.ones(size.shape) if pattern.weight is None else np.asarray(pattern.weight, dtype=np.float64)
+    matters = np.full(size.shape, pattern.phase_matters) & (size > 0) & (weight > 0)
+    if pattern.any_phase is not None:
+        matters &= ~pattern.any_phase
+    sizes, phases, weights = (part.reshape(-1, n) for part in (size, np.where(matters, angle, np.nan), weight))
+    if pattern.walking is None and not matters.any():
+        heeded = sizes if np.all(weights > 0) else sizes * (weights > 0)
+        yield from (AmplitudeTarget(tuple(levels)) for levels in heeded.tolist())
+        return
+    for number, (levels, phase, heed) in enumerate(zip(sizes, phases, weights, strict=True)):
+        if pattern.walking is not None and np.any(levels):
+            place, walking = number % device.chains_per_row * n, pattern.walking
+            width, rate_hz = (None if np.isnan(one) else float(one) for one in (walking.width, walking.rate_hz))
+            yield WalkingTarget(tuple(levels.tolist()), tuple(heed.tolist()), width, rate_hz, place)
+        else:
+            yield _standing(levels, phase, heed)
+
+
+def _standing(levels: Floats, phases: Floats, weights: Floats) -> ChainTarget:
+    """What does not walk: a wave where several phases matter, else amplitudes."""
+    phased = np.flatnonzero(~np.isnan(phases))
+    turn = float(phases[phased[0]]) if len(phased) else 0.0
+    if len(levels) == 1 or not len(phased):
+        return AmplitudeTarget.of(levels if np.all(weights > 0) else levels * (weights > 0), turn)
+    straight = np.round(np.remainder(phases - turn + np.pi, 2 * np.pi) - np.pi, PHASE_DECIMALS)
+    # Half a turn one way is half a turn the other way.
+    straight = np.where(straight <= -np.round(np.pi, PHASE_DECIMALS), -straight, straight)
+    return WaveTarget.of(np.round(levels, AMPLITUDE_DECIMALS), straight + 0.0, weights, turn)
