@@ -6,7 +6,7 @@ import errno
 import hashlib
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -79,12 +79,16 @@ class IconRun:
     chosen: dict[str, Pattern] = field(default_factory=dict)
     waves: dict[str, str] = field(default_factory=dict)
     worked: int = 0
-    began: float = field(default_factory=time.monotonic)
+    clock: Callable[[], float] = time.monotonic
+    began: float = field(init=False)
     stopped: bool = False
+
+    def __post_init__(self) -> None:
+        self.began = self.clock()
 
     def _late(self) -> bool:
         """Whether no time is left; work was then left undone."""
-        if self.options.budget_s is not None and time.monotonic() - self.began > self.options.budget_s:
+        if self.options.budget_s is not None and self.clock() - self.began > self.options.budget_s:
             self.stopped = True
         return self.stopped
 
