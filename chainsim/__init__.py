@@ -13,6 +13,7 @@ from .model.calibrated import Actuator, ActuatorSpread
 from .model.device import Amplifier, Coupling, Device, Note, Span, device_names, load_device
 from .model.response import Branch, Outcome, Response, Stats
 from .npy_header import NpyHeader, read_npy_header
+from .reading import first_bytes
 from .rung import RUNGS, TERMS, Rung, RungError, Start, load_rung
 from .yamlfile import Located, parse_model, read_located, read_model
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from .harmonic_balance.joint_branches import Branches, joint_branches
     from .harmonic_balance.rung import balance_near
     from .harmonic_balance.sensitivity import Gradient, gradient
+    from .npz_file import opened_npz
     from .reach.ladder import solve
     from .time_domain.as_built import AsBuilt
     from .time_domain.integrate import Escape, GridError, GridIntegrator
@@ -97,6 +99,7 @@ __all__ = [
     "decide",
     "delta_from_critical_lam",
     "device_names",
+    "first_bytes",
     "follow",
     "gain_per_stage",
     "gradient",
@@ -105,6 +108,7 @@ __all__ = [
     "load_device",
     "load_rung",
     "modulated",
+    "opened_npz",
     "parse_model",
     "parse_simulation",
     "peak_gain",
@@ -134,6 +138,7 @@ _LATE = {
     "decide": "averaging.decide",
     "Decision": "averaging.decide",
     "modulated": "effects.effects",
+    "opened_npz": "npz_file",
     "bending_modes": "effects.effects",
     "Play": "effects.effects",
     "Mode": "effects.effects",

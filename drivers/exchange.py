@@ -15,9 +15,10 @@ from planner import Plan
 
 from .ahap import read_ahap, to_ahap
 from .errors import FileError, UnreadableWaveform
-from .files import atomic_file, naming
+from .files import atomic_file, first_of_plain, naming
 from .haptic_curves import HapticCurves, haptic_curves
 from .hjif import read_hjif, to_hjif
+from .manifest import MOST_BYTES
 from .meta_haptic import read_meta, to_meta
 from .samples import EXCHANGE_SUFFIXES
 
@@ -62,8 +63,9 @@ def read_exchange(path: Path | str) -> HapticCurves:
     reader: Callable[[Any], HapticCurves] = {".hjif": read_hjif, ".ahap": read_ahap, ".haptic": read_meta}[
         _suffix(path)
     ]
-    with naming(path):
-        raw = path.read_bytes()
+    raw = first_of_plain(path, MOST_BYTES + 1)
+    if len(raw) > MOST_BYTES:
+        raise UnreadableWaveform(f"{path}: more than {MOST_BYTES} bytes; a haptic file has at most so many")
     try:
         return reader(json.loads(raw))
     except KeyError as error:

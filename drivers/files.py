@@ -15,7 +15,7 @@ from typing import BinaryIO
 from .errors import FileError
 from .parts import Belongs, Part, finish, is_at, make, settle, sync_folder
 
-__all__ = ["atomic_file", "atomic_files", "made_folder", "naming", "settled"]
+__all__ = ["atomic_file", "atomic_files", "check_plain", "first_of_plain", "made_folder", "naming", "settled"]
 
 TAKEN_AWAY = "another program took away what was written so far; write it again, or in a folder of your own"
 NOT_A_FILE = "this is a device or a pipe; give the name of a file"
@@ -32,6 +32,25 @@ def naming(path: Path) -> Iterator[None]:
         refused = FileError(f"{path}: {_complaint(path, error)}")
         refused.errno = error.errno
         raise refused from None
+
+
+def check_plain(path: Path) -> None:
+    """Refuse what cannot be read twice, or from any place: a pipe, a device, a folder; nothing is opened.
+
+    Raises
+    ------
+    FileError
+        Also when there is no such file.
+    """
+    with naming(path):
+        _check_mode(path.stat().st_mode)
+
+
+def first_of_plain(path: Path, most: int) -> bytes:
+    """The first `most` bytes of a plain file; raises as `check_plain` does, and when it cannot be read."""
+    check_plain(path)
+    with naming(path), path.open("rb") as file:
+        return file.read(most)
 
 
 @contextmanager
@@ -165,11 +184,14 @@ def _finish(parts: Sequence[Part]) -> None:
 
 def _check_target(path: Path) -> None:
     with suppress(FileNotFoundError):
-        mode = path.stat().st_mode
-        if S_ISDIR(mode):
-            raise IsADirectoryError(errno.EISDIR, "is a folder")
-        if not S_ISREG(mode):
-            raise OSError(errno.EINVAL, NOT_A_FILE)
+        _check_mode(path.stat().st_mode)
+
+
+def _check_mode(mode: int) -> None:
+    if S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder")
+    if not S_ISREG(mode):
+        raise OSError(errno.EINVAL, NOT_A_FILE)
 
 
 # Folders by their absolute path as this process left them: when they last changed, and names whose writes wait there.

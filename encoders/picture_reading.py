@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .picture_errors import PictureBroken, PictureError, PictureTooLarge
+from .reading import first_bytes
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -127,8 +128,7 @@ def read_picture(
 
 def _file_bytes(path: Path, limits: PictureLimits) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(limits.file_bytes + 1)
+        return first_bytes(path, limits.file_bytes + 1)
     except (OSError, ValueError) as error:
         raise PictureError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
