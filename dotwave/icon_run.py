@@ -166,7 +166,10 @@ class IconRun:
         if "bad" in record:
             self.failed[name] = record["bad"]
             return
-        path = self._wave(name)
+        path, key = self._wave(name), f"wave:{name}"
+        if key in self.journal:
+            # Should this be the last that is done, the old files are not taken for what the journal said they are.
+            self.journal.add({"key": key, "made": "", "file": ""})
         try:
             _put_pair(path, record["wav"], record["json"])
         except FileError as error:
@@ -175,7 +178,7 @@ class IconRun:
             self.failed[name] = str(error)
             return
         self.waves[name] = path.relative_to(self.out).as_posix()
-        self.journal.add({"key": f"wave:{name}", "made": record["key"], "file": self.waves[name]})
+        self.journal.add({"key": key, "made": record["key"], "file": self.waves[name]})
 
     def _do(
         self, pool: Pool, work: Work, recipe: Recipe, tasks: Iterable[Task], label: str, total: int, batch: int
