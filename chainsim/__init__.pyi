@@ -107,9 +107,11 @@ from .npy_header import (
     NpyHeader as NpyHeader,
     read_npy_header as read_npy_header,
 )
+from .npz_file import opened_npz as opened_npz
 from .reach.ladder import (
     solve as solve,
 )
+from .reading import first_bytes as first_bytes
 from .rung import (
     RUNGS as RUNGS,
     TERMS as TERMS,

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from .complaints import Place, complaint_of, words_of
 from .errors import ProfileError
+from .reading import first_bytes
 from .yaml_tree import compose, first_line, values_of
 
 __all__ = ["Located", "parse_model", "read_located", "read_model"]
@@ -48,8 +49,7 @@ def read_located(path: Path, model: type[Model]) -> Located[Model]:
         When the file cannot be read, is not YAML, or does not fit the model.
     """
     try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+        raw = first_bytes(path, MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         raise ProfileError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(raw) > MAX_BYTES:

@@ -212,3 +212,49 @@ def test_entities_that_grow_without_end_are_refused() -> None:
 def test_odd_sizes_are_drawn_or_refused(size: str) -> None:
     with contextlib.suppress(PictureError):
         assert max(drawn(DOT, f'<svg xmlns="http://www.w3.org/2000/svg" {size}>').size) <= 64
+
+
+def test_a_style_sheet_that_comes_in_pieces_is_as_tame() -> None:
+    path = '<path d="M0 4H8"/>'
+    solid = alpha(drawn(f"<style>path{{stroke:#000;stroke-width:2}}</style>{path}"))
+    for dashes in ("stroke-d&#97;sharray:1,1", "stroke-d<g/>asharray:1,1", "stroke-dash<!-- -->array:1,1"):
+        sheet = f"<style>path{{stroke:#000;stroke-width:2;{dashes}}}</style>"
+        np.testing.assert_array_equal(alpha(drawn(sheet + path)), solid)
+
+
+PIXEL = "data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "<style>zz g g g g g g rect{fill:red}</style>" + "<g>" * 45 + "<rect/>" * 5 + "</g>" * 45,
+        "<style>zz>g+g~g g g g rect{fill:red}</style>" + "<g>" * 45 + "<rect/>" * 5 + "</g>" * 45,
+        "<style>" + "rect{fill:red}" * 5000 + "</style>" + "<rect/>" * 6000,
+        "<style>" + "a," * 5000 + "rect{fill:red}</style>" + "<rect/>" * 6000,
+        "<style>rect{" + "fill:red;" * 5000 + "}</style>" + "<rect/>" * 6000,
+        '<rect style="' + "fill:red;" * 20_001 + '"/>',
+        f'<image href="{PIXEL}"/>' * 401,
+        f'<g id="a"><image href="{PIXEL}"/></g>' + '<use href="#a"/>' * 400,
+    ],
+)
+def test_what_takes_long_is_refused_before_it_is_drawn(body: str) -> None:
+    with pytest.raises(PictureTooLarge, match="takes as long to draw as a path of"):
+        tame_svg("a", f"{HEAD}{body}</svg>".encode(), PictureLimits())
+
+
+def test_bitmaps_have_a_bound_together() -> None:
+    buffer = io.BytesIO()
+    Image.new("1", (1500, 1500)).save(buffer, "PNG")
+    image = f'<image href="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"/>'
+    tame_svg("a", f"{HEAD}{image}</svg>".encode(), PictureLimits())
+    with pytest.raises(PictureTooLarge, match="embedded bitmaps of more than 4000000 pixels"):
+        tame_svg("a", f"{HEAD}{image * 2}</svg>".encode(), PictureLimits())
+
+
+def test_sheets_of_drawing_programs_are_taken() -> None:
+    rules = "".join(
+        f".cls-{number}, svg g .k{number} > path {{fill: #0{number:03x}; stroke: none;}}" for number in range(99)
+    )
+    body = f"<style>{rules}</style>" + '<g><g><path class="cls-1" d="M0 0H8V8z"/></g></g>' * 500
+    tame_svg("a", f"{HEAD}{body}</svg>".encode(), PictureLimits())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import os
 import shutil
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -56,6 +58,20 @@ def test_the_manifest_says_what_the_encoder_says(done: Path) -> None:
         assert row["similarity"] == pytest.approx(scene.report.similarity, abs=2e-6)
         assert row["outcome"] == "ok"
         assert row["error"] < 1e-6
+
+
+def test_a_budget_is_kept_by_the_clock_that_is_given(done: Path, tmp_path: Path) -> None:
+    seconds = itertools.count()
+    budget = replace(ONE, budget_s=4.5)
+    # One reading when all begins, one when the work does; then one before each icon.
+    first = render_icons([str(SAMPLES)], tmp_path, budget, clock=lambda: float(next(seconds)))
+    icons = len(list(SAMPLES.iterdir()))
+    assert (first.worked, len(first.unfinished), first.complete) == (4, icons - 4, False)
+    assert "Budget 4.5 s: used up" in first.as_text()
+    second = render_icons([str(SAMPLES)], tmp_path, budget, clock=lambda: 0.0)
+    assert (second.worked, second.unfinished, second.complete) == (icons - 4, (), True)
+    for name in OUTPUTS:
+        assert (tmp_path / name).read_bytes() == (done / name).read_bytes()
 
 
 def test_neighbours_are_the_nearest_in_dots(done: Path) -> None:

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drivers.waveform.coupling import CouplingWriter, LamTrack
 from hypothesis import given, settings, strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Amplifier, Chain, Closure, Device, GridIntegrator, load_device
 from drivers import Waveform
+from drivers.waveform.coupling import CouplingWriter, LamTrack
 from encoders import Frame, TargetPattern
 from planner import FirstOrderHold, FramePlan, OperatingPoint, Plan, PointTone, Ramp, ToneRamp, links_at
 from planner.drive import cubic, cubic_slope, curve, felt, full_motion, play, samples, smooth_step

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from stat import S_ISREG
 from typing import TextIO
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from ..complaints import shown
 from ..errors import ProfileError
 from ..npy_header import NpyHeader, read_npy_header
+from ..npz_file import opened_npz
 
 __all__ = ["AXES", "MOST_NUMBERS", "read_table"]
 
@@ -49,9 +51,11 @@ def read_table(path: Path) -> dict[str, Floats]:
     if path.suffix.lower() not in readers:
         raise ProfileError(f"{path}: expected a table named .npz or .csv")
     try:
-        path.stat()
+        plain = S_ISREG(path.stat().st_mode)
     except (OSError, ValueError) as error:
         raise ProfileError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    if not plain:
+        raise ProfileError(f"{path}: is not a file; save what comes from elsewhere first, a table is read twice")
     try:
         found = readers[path.suffix.lower()](path)
     except OSError as error:
@@ -77,7 +81,7 @@ def _refuse_size(path: Path, numbers: int) -> None:
 
 def _read_npz(path: Path) -> dict[str, Floats]:
     try:
-        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+        with opened_npz(path) as archive:
             members = {info.filename: info for info in archive.infolist()}
             if len(members) < len(archive.infolist()):
                 raise ProfileError(f"{path}: an array is given twice; keep one")

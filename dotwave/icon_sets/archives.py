@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import lzma
 import struct
@@ -12,7 +13,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-__all__ = ["ARCHIVES", "BROKEN", "members"]
+__all__ = ["ARCHIVES", "BROKEN", "check_plain", "members"]
 
 ARCHIVES = (".zip", ".tar", ".tgz", ".tar.gz", ".tbz2", ".tar.bz2", ".txz", ".tar.xz")
 # What the readers of archives raise on damaged ones.
@@ -23,6 +24,8 @@ BROKEN = (
 
 # Longest name or other header of a tar member that is read, in bytes; tarfile itself would take any.
 LONGEST_HEADER = 1 << 20
+# Of a zip's directory, which is read in one piece; a million members have about as much.
+LONGEST_DIRECTORY = 1 << 27
 HEADERS = {
     tarfile.GNUTYPE_LONGLINK, tarfile.GNUTYPE_LONGNAME, tarfile.SOLARIS_XHDTYPE, tarfile.XGLTYPE, tarfile.XHDTYPE,
 }  # fmt: skip
@@ -41,6 +44,7 @@ def members(archive: Path) -> Iterator[tuple[str, Callable[[int], bytes]]]:
     BROKEN
         When the archive, or the part that comes next, cannot be read; the function too, for its member only.
     """
+    check_plain(archive)
     if archive.name.lower().endswith(".zip"):
         with _LenientNames(archive) as file, zipfile.ZipFile(file) as unzipped:
             for info in unzipped.infolist():
@@ -51,6 +55,18 @@ def members(archive: Path) -> Iterator[tuple[str, Callable[[int], bytes]]]:
         for entry in tar:
             if entry.isfile():
                 yield entry.name, partial(_first_of_tar, tar, entry)
+
+
+def check_plain(path: Path) -> None:
+    """Refuse a pipe or a device, which might never come to an end.
+
+    Raises
+    ------
+    OSError
+        Without a word on anything else.
+    """
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "is not a file")
 
 
 def _first(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
@@ -91,6 +107,8 @@ class _LenientNames(io.BufferedReader):
 
     def read(self, size: int | None = -1, /) -> bytes:
         """As of the file; the directory, which zipfile reads in one piece, has its flags put right."""
+        if size is not None and size > LONGEST_DIRECTORY:
+            raise zipfile.BadZipFile(f"a directory of {size} bytes; at most {LONGEST_DIRECTORY} are read")
         data = super().read(size)
         return _relabelled(data) if data.startswith(ENTRY) else data
 

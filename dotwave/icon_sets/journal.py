@@ -14,6 +14,8 @@ from drivers import FileError, naming
 __all__ = ["Journal"]
 
 START = b'{"key":'
+# Longer than any record is; what is longer is not one.
+LONGEST = 1 << 24
 
 
 class Journal:
@@ -38,7 +40,7 @@ class Journal:
                 raise FileError(f"{path}: not a plain file, so nothing can be kept there; move it away")
             end, raw = 0, b"\n"
             with path.open("rb") as lines:
-                for raw in lines:
+                for raw in iter(lambda: lines.readline(LONGEST), b""):
                     if not end and not _starts(raw):
                         os.close(self._file)
                         raise FileError(f"{path}: not a journal of dotwave icons; give another folder, or move it away")

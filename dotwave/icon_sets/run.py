@@ -6,7 +6,7 @@ import errno
 import hashlib
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -79,12 +79,16 @@ class IconRun:
     chosen: dict[str, Pattern] = field(default_factory=dict)
     waves: dict[str, str] = field(default_factory=dict)
     worked: int = 0
-    began: float = field(default_factory=time.monotonic)
+    clock: Callable[[], float] = time.monotonic
+    began: float = field(init=False)
     stopped: bool = False
+
+    def __post_init__(self) -> None:
+        self.began = self.clock()
 
     def _late(self) -> bool:
         """Whether no time is left; work was then left undone."""
-        if self.options.budget_s is not None and time.monotonic() - self.began > self.options.budget_s:
+        if self.options.budget_s is not None and self.clock() - self.began > self.options.budget_s:
             self.stopped = True
         return self.stopped
 
@@ -162,7 +166,10 @@ class IconRun:
         if "bad" in record:
             self.failed[name] = record["bad"]
             return
-        path = self._wave(name)
+        path, key = self._wave(name), f"wave:{name}"
+        if key in self.journal:
+            # Should this be the last that is done, the old files are not taken for what the journal said they are.
+            self.journal.add({"key": key, "made": "", "file": ""})
         try:
             _put_pair(path, record["wav"], record["json"])
         except FileError as error:
@@ -171,7 +178,7 @@ class IconRun:
             self.failed[name] = str(error)
             return
         self.waves[name] = path.relative_to(self.out).as_posix()
-        self.journal.add({"key": f"wave:{name}", "made": record["key"], "file": self.waves[name]})
+        self.journal.add({"key": key, "made": record["key"], "file": self.waves[name]})
 
     def _do(
         self, pool: Pool, work: Work, recipe: Recipe, tasks: Iterable[Task], label: str, total: int, batch: int

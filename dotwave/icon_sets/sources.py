@@ -14,7 +14,7 @@ from drivers import naming
 from encoders import PictureLimits
 
 from ..errors import AppError
-from .archives import ARCHIVES, BROKEN, members
+from .archives import ARCHIVES, BROKEN, check_plain, members
 from .names import shown_name, unique_names
 
 __all__ = ["IconFile", "IconPlace", "find_icons", "read_icons"]
@@ -129,6 +129,7 @@ def _member(name: str, first: Callable[[int], bytes], most: int) -> IconFile:
 
 
 def _first(path: Path, most: int) -> bytes:
+    check_plain(path)
     with path.open("rb") as file:
         return file.read(most)
 

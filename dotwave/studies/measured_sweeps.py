@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from chainsim import Device
+from chainsim import Device, first_bytes
 
 from ..errors import AppError
 from ..source import standard_input
@@ -78,7 +78,7 @@ def read_sweeps(source: str, device: Device) -> dict[ChainPlace, Sweep]:
 
 def _text(source: str) -> str:
     try:
-        raw = standard_input().read(MAX_BYTES + 1) if source == "-" else _file(Path(source))
+        raw = standard_input().read(MAX_BYTES + 1) if source == "-" else first_bytes(Path(source), MAX_BYTES + 1)
         if len(raw) > MAX_BYTES:
             raise AppError(f"{source}: more than {MAX_BYTES} bytes; sweep fewer points, or a row at a time")
         return raw.decode("utf-8-sig")
@@ -86,11 +86,6 @@ def _text(source: str) -> str:
         raise AppError(f"{source}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise AppError(f"{source}: not UTF-8 at byte {error.start}; save it as CSV in UTF-8") from None
-
-
-def _file(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(MAX_BYTES + 1)
 
 
 def _points(source: str, device: Device) -> Iterator[tuple[tuple[int, int], _Point]]:

@@ -52,6 +52,8 @@ class Parts:
 
     def done(self, first: int) -> bool:
         """Whether the chunk that starts at `first` is there as it was kept; one that is damaged is not."""
+        if not self.path(first).is_file():
+            return False
         try:
             with self.path(first).open("rb") as file:
                 digest = self._digest(first, file)

@@ -20,6 +20,7 @@ from ..errors import AppError
 __all__ = ["claimed", "removed"]
 
 NOTE = "sweep.json"
+LONGEST_NOTE = 1 << 20
 CHUNK = re.compile(r"\d{12}\.npz")
 FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
@@ -137,7 +138,10 @@ def _read(folder: Path) -> dict[str, Any]:
     """The note; empty when there is none that can be read."""
     path = folder / NOTE
     try:
-        note = json.loads(path.read_bytes()) if S_ISREG(path.lstat().st_mode) else {}
+        if not S_ISREG(path.lstat().st_mode):
+            return {}
+        with path.open("rb") as file:
+            note = json.loads(file.read(LONGEST_NOTE))
     except (OSError, ValueError, RecursionError):
         return {}
     return note if isinstance(note, dict) else {}

@@ -14,8 +14,9 @@ from typing import Any
 from planner import Plan
 
 from ..errors import FileError, UnreadableWaveform
-from ..files.whole import atomic_file, naming
+from ..files.whole import atomic_file, first_of_plain, naming
 from ..formats.samples import EXCHANGE_SUFFIXES
+from ..waveform.manifest import MOST_BYTES
 from .ahap import read_ahap, to_ahap
 from .curves import HapticCurves, haptic_curves
 from .haptic import read_meta, to_meta
@@ -62,8 +63,9 @@ def read_exchange(path: Path | str) -> HapticCurves:
     reader: Callable[[Any], HapticCurves] = {".hjif": read_hjif, ".ahap": read_ahap, ".haptic": read_meta}[
         _suffix(path)
     ]
-    with naming(path):
-        raw = path.read_bytes()
+    raw = first_of_plain(path, MOST_BYTES + 1)
+    if len(raw) > MOST_BYTES:
+        raise UnreadableWaveform(f"{path}: more than {MOST_BYTES} bytes; a haptic file has at most so many")
     try:
         return reader(json.loads(raw))
     except KeyError as error:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
-__all__ = ["held"]
+__all__ = ["alone_in", "held"]
 
 # What a system says of a lock that somebody else has; anything else means that it has no such locks here.
 TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
+# Whoever renames files holds a folder for milliseconds; who holds it for longer does something else there.
+PATIENCE_S, PAUSE_S = 10.0, 0.002
 
 
 def held(number: int) -> bool | None:
@@ -31,3 +38,22 @@ def held(number: int) -> bool | None:
     except OSError as error:
         return False if error.errno in TAKEN else None
     return True
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder while the body runs, and wait for it a while.
+
+    Where there are no such locks, or somebody keeps it, the body runs without.
+    """
+    number = None
+    with suppress(OSError):
+        number = os.open(folder, os.O_RDONLY)
+    try:
+        until = time.monotonic() + PATIENCE_S
+        while number is not None and held(number) is False and time.monotonic() < until:
+            time.sleep(PAUSE_S)
+        yield
+    finally:
+        if number is not None:
+            os.close(number)

@@ -5,7 +5,8 @@ the last one is renamed to end in ``.ready``. From this one rename on the new fi
 the others get their names, and the last one after them. Of a writer that died, a token without ``.ready`` is thus
 deleted; with one, what is left gets its name.
 
-A living writer holds a lock on each of its parts. Where a file system has no locks, nothing of others is touched.
+A living writer holds a lock on each of its parts, and one on the folder while several files get their names, so that no
+two writes are mixed. Where a file system has no locks, nothing of others is touched.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import BinaryIO
 
-from .locks import held
+from .locks import alone_in, held
 
-__all__ = ["Belongs", "Part", "finish", "is_at", "make", "part_of", "settle", "sync_folder"]
+__all__ = ["Belongs", "Part", "finish", "is_at", "make", "part_of", "settle", "settle_alone", "sync_folder"]
 
 Belongs = Callable[[str], bool]
 """Whether a file of this name may be put in place."""
@@ -109,9 +110,15 @@ def settle(folder: Path, belongs: Belongs, *, others: bool) -> frozenset[str]:
     OSError
         When a file that belongs cannot be put in place.
     """
-    left: set[str] = set()
-    if sys.platform == "win32":
+    if sys.platform == "win32" or not _left_in(folder):
         return frozenset()
+    with alone_in(folder):
+        return settle_alone(folder, belongs, others=others)
+
+
+def settle_alone(folder: Path, belongs: Belongs, *, others: bool) -> frozenset[str]:
+    """The same, for who holds the folder (`alone_in`) already."""
+    left: set[str] = set()
     for token, parts in _left_in(folder).items():
         if others or any(belongs(one.path.name) for one in parts):
             left |= _settle(folder, token, parts, belongs)

@@ -7,15 +7,16 @@ import os
 import secrets
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO
 
 from ..errors import FileError
-from .parts import Belongs, Part, finish, is_at, make, settle, sync_folder
+from .locks import alone_in
+from .parts import Belongs, Part, finish, is_at, make, settle, settle_alone, sync_folder
 
-__all__ = ["atomic_file", "atomic_files", "made_folder", "naming", "settled"]
+__all__ = ["atomic_file", "atomic_files", "check_plain", "first_of_plain", "made_folder", "naming", "settled"]
 
 TAKEN_AWAY = "another program took away what was written so far; write it again, or in a folder of your own"
 NOT_A_FILE = "this is a device or a pipe; give the name of a file"
@@ -32,6 +33,25 @@ def naming(path: Path) -> Iterator[None]:
         refused = FileError(f"{path}: {_complaint(path, error)}")
         refused.errno = error.errno
         raise refused from None
+
+
+def check_plain(path: Path) -> None:
+    """Refuse what cannot be read twice, or from any place: a pipe, a device, a folder; nothing is opened.
+
+    Raises
+    ------
+    FileError
+        Also when there is no such file.
+    """
+    with naming(path):
+        _check_mode(path.stat().st_mode)
+
+
+def first_of_plain(path: Path, most: int) -> bytes:
+    """The first `most` bytes of a plain file; raises as `check_plain` does, and when it cannot be read."""
+    check_plain(path)
+    with naming(path), path.open("rb") as file:
+        return file.read(most)
 
 
 @contextmanager
@@ -78,8 +98,8 @@ def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple
 
     Gives empty files, open for writing and reading; they are closed at the end. Then all are flushed to the disk and
     get their names in the given order. Whatever stops the body, an error, Ctrl-C or SIGKILL, the files of these names
-    are all the old ones or all the new ones; what a killed writer leaves half done is settled by the next one, or by
-    `settled`.
+    are all the old ones or all the new ones, and of several writers those of the last; what a killed writer leaves
+    half done is settled by the next one, or by `settled`.
 
     Parameters
     ----------
@@ -101,19 +121,23 @@ def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[B
     parts = [Part(path, token) for path in paths]
     files: list[BinaryIO] = []
     place = os.path.abspath(folder)
-    _tidy(place, paths, belongs or {path.name for path in paths}.__contains__)
+    belongs = belongs or {path.name for path in paths}.__contains__
+    _tidy(place, paths, belongs)
     try:
-        try:
+        with ExitStack() as undone:
+            undone.callback(_finish, parts)
             for part in parts:
                 with naming(part.path):
                     _check_target(part.path)
                     files.append(make(part))
             began = _changed(folder)
             yield tuple(files)
-            alone = _changed(folder) == began
-            _make_count(parts, files)
-        finally:
-            _finish(parts)
+            _flush(parts, files)
+            # One name cannot be mixed with another's.
+            with alone_in(folder) if len(parts) > 1 else nullcontext():
+                undone.pop_all()
+                alone = _changed(folder) == began
+                _put_in_place(parts, files, None if alone or len(parts) == 1 else belongs)
     finally:
         for file in files:
             # Closing flushes what is left of a write that came to nothing: on a full disk that fails again.
@@ -132,22 +156,38 @@ def settled(path: Path, belongs: Belongs) -> None:
         settle(path.parent, belongs, others=False)
 
 
-def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
-    """Bring all files to the disk, then do the one rename that makes them count."""
+def _flush(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
+    """Bring all files to the disk."""
     for part, file in zip(parts, files, strict=True):
         with naming(part.path):
             file.flush()
             os.fsync(file.fileno())
-            _check_target(part.path)
-            if not is_at(part.part, file.fileno()):
-                raise OSError(errno.ESTALE, TAKEN_AWAY)
-            if sys.platform == "win32":
-                file.close()  # Windows renames no open file
+
+
+def _put_in_place(parts: Sequence[Part], files: Sequence[BinaryIO], others: Belongs | None) -> None:
+    """Do the one rename that makes the files count, and give them their names.
+
+    `others` : files of these names that another writer, who began later and died, may have left half done; these get
+    their names before.
+    """
     last = parts[-1]
-    with naming(last.path):
-        os.replace(last.part, last.ready if len(parts) > 1 else last.path)
-    # After a power cut, too: should the names be lost that come after this, they are given again.
-    sync_folder(last.path.parent)
+    try:
+        with naming(last.path):
+            if others is not None:
+                settle_alone(last.path.parent, others, others=False)
+        for part, file in zip(parts, files, strict=True):
+            with naming(part.path):
+                _check_target(part.path)
+                if not is_at(part.part, file.fileno()):
+                    raise OSError(errno.ESTALE, TAKEN_AWAY)
+                if sys.platform == "win32":
+                    file.close()  # Windows renames no open file
+        with naming(last.path):
+            os.replace(last.part, last.ready if len(parts) > 1 else last.path)
+        # After a power cut, too: should the names be lost that come after this, they are given again.
+        sync_folder(last.path.parent)
+    finally:
+        _finish(parts)
 
 
 def _finish(parts: Sequence[Part]) -> None:
@@ -165,11 +205,14 @@ def _finish(parts: Sequence[Part]) -> None:
 
 def _check_target(path: Path) -> None:
     with suppress(FileNotFoundError):
-        mode = path.stat().st_mode
-        if S_ISDIR(mode):
-            raise IsADirectoryError(errno.EISDIR, "is a folder")
-        if not S_ISREG(mode):
-            raise OSError(errno.EINVAL, NOT_A_FILE)
+        _check_mode(path.stat().st_mode)
+
+
+def _check_mode(mode: int) -> None:
+    if S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder")
+    if not S_ISREG(mode):
+        raise OSError(errno.EINVAL, NOT_A_FILE)
 
 
 # Folders by their absolute path as this process left them: when they last changed, and names whose writes wait there.

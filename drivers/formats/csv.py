@@ -21,7 +21,8 @@ __all__ = ["CsvReader", "CsvWriter"]
 Floats = NDArray[np.float64]
 
 DIGITS = 9  # keeps any float32 apart from its neighbours
-LONGEST_LINE = 1 << 20
+LONGEST_NAMES = 1 << 20
+LONGEST_NUMBER = 40
 
 
 class CsvWriter:
@@ -71,7 +72,7 @@ class CsvReader:
         """
         names = _names(channels)
         with naming(path), path.open("rb") as file:
-            first = file.readline(LONGEST_LINE).decode("utf-8", "replace").rstrip("\r\n")
+            first = file.readline(LONGEST_NAMES).decode("utf-8", "replace").rstrip("\r\n")
             if first != ",".join(names):
                 raise UnreadableWaveform(f"{path}:1: expected the columns {names[0]}, {names[1]}, ... of its manifest")
             samples = sum(piece.count(b"\n") for piece in iter(lambda: file.read(1 << 20), b""))
@@ -87,11 +88,12 @@ class CsvReader:
         """
         with naming(self.path):
             file = self.path.open("rb")
+        longest = LONGEST_NUMBER * self.columns
         with file:
-            file.readline(LONGEST_LINE)
+            file.readline(LONGEST_NAMES)
             for first in range(0, self.samples, block):
                 with naming(self.path):
-                    lines = [file.readline(LONGEST_LINE) for _ in range(min(block, self.samples - first))]
+                    lines = [file.readline(longest) for _ in range(min(block, self.samples - first))]
                 values = self._values(lines, first)
                 check_finite(self.path, values[:, 1:], first, self.rate_hz)
                 yield values[:, 1:]

@@ -14,7 +14,7 @@ from typing import IO, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import NpyHeader, read_npy_header
+from chainsim import NpyHeader, opened_npz, read_npy_header
 
 from ..channels import Channel
 from ..errors import UnreadableWaveform
@@ -89,7 +89,7 @@ class NpzReader:
             When it cannot be read, or does not hold float64 volts of so many channels and a rate.
         """
         try:
-            with naming(path), path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            with naming(path), opened_npz(path) as archive:
                 with archive.open(VOLTS) as member:
                     volts = _header(member)
                 with archive.open(RATE) as member:
@@ -111,10 +111,8 @@ class NpzReader:
         FileError, UnreadableWaveform
             When the file cannot be read, is damaged, or holds a value that is not finite.
         """
-        with naming(self.path):
-            file = self.path.open("rb")
         try:
-            with file, zipfile.ZipFile(file) as archive, archive.open(VOLTS) as member:
+            with naming(self.path), opened_npz(self.path) as archive, archive.open(VOLTS) as member:
                 _header(member)
                 for first in range(0, self.samples, block):
                     yield self._block(member, first, min(block, self.samples - first))
@@ -124,8 +122,7 @@ class NpzReader:
             raise UnreadableWaveform(f"{self.path}: damaged: {error}") from None
 
     def _block(self, member: IO[bytes], first: int, samples: int) -> Floats:
-        with naming(self.path):
-            raw = member.read(8 * self.channels * samples)
+        raw = member.read(8 * self.channels * samples)
         if len(raw) < 8 * self.channels * samples:
             raise UnreadableWaveform(f"{self.path}: it ends early")
         values = np.frombuffer(raw, dtype="<f8").astype(np.float64).reshape(-1, self.channels)

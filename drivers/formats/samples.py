@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..channels import Channel
 from ..errors import FileError, WaveformError
+from ..files.whole import check_plain
 from .wav import Encoding, WavWriter
 from .wav_reader import WavReader
 
@@ -126,6 +127,7 @@ def open_samples(path: Path, channels: Sequence[Channel], rate_hz: int) -> Sampl
         When the file cannot be read or is not of that format.
     """
     suffix = check_suffix(path)
+    check_plain(path)
     if suffix == ".wav":
         return WavReader.open(path, [channel.volts_per_unit for channel in channels])
     module, name = OTHERS[suffix]

@@ -14,7 +14,7 @@ from planner import FramePlan, Plan
 from ..channels import channels_of
 from ..errors import UnreadableWaveform
 from ..files.parts import Belongs
-from ..files.whole import atomic_files, naming, settled
+from ..files.whole import atomic_files, check_plain, naming, settled
 from ..formats.samples import SUFFIXES, SampleReader, check_suffix, open_samples, writer_for
 from ..formats.wav import Encoding
 from .limits import LimitCheck
@@ -126,9 +126,8 @@ def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     path = Path(path)
     manifest_path = path if path.suffix.lower() == ".json" else path.with_suffix(".json")
     settled(manifest_path, _belongs(path))
-    with naming(path):
-        # What was asked for is missed before what belongs to it.
-        path.stat()
+    # What was asked for is missed before what belongs to it.
+    check_plain(path)
     manifest = read_manifest(manifest_path)
     samples_path = manifest_path.with_name(manifest.samples_file)
     if path != manifest_path and path.name != samples_path.name:

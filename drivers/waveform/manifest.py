@@ -24,11 +24,15 @@ from ..errors import UnreadableWaveform, WaveformError
 from ..files.whole import naming
 from .coupling import CouplingEvent, CouplingWriter, LamTrack
 
-__all__ = ["SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open"]
+__all__ = ["MOST_BYTES", "SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open"]
 
 Floats = NDArray[np.float64]
 
 SCHEMA = "dotwave/waveform/1"
+# About four hours of a grid with a lam on every link; reading takes ten times as much memory.
+MOST_BYTES = 500_000_000
+# Of it, what stands beside frames and coupling.
+REST_BYTES = 10_000_000
 DIGITS = 12  # significant digits of a target in the file
 ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
 
@@ -187,7 +191,7 @@ class ManifestWriter:
         Raises
         ------
         WaveformError
-            When the driven chains of a row differ in omega, which a manifest cannot say.
+            When the driven chains of a row differ in omega, which a manifest cannot say, or it becomes too long.
         FileError
             When the disk is full.
         """
@@ -197,6 +201,10 @@ class ManifestWriter:
             if frame.frame is not None:
                 self._marks.add(_mark(self._device, frame, self.frames))
                 self.frames += 1
+        if self._events.size + self._marks.size > MOST_BYTES - REST_BYTES:
+            raise WaveformError(
+                f"{self._path}: a manifest of more than {MOST_BYTES} bytes is not read again; give less at a time"
+            )
 
     def write(self, out: BinaryIO, samples_file: str, samples: int, digest: str, encoding: Mapping[str, Any]) -> None:
         """Write the whole manifest to `out`.
@@ -235,11 +243,10 @@ class _Spool:
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
-        self._empty = True
+        self.size = 0
 
     def add(self, item: dict[str, Any]) -> None:
-        self._file.write((b"\n" if self._empty else b",\n") + _json(item))
-        self._empty = False
+        self.size += self._file.write((b",\n" if self.size else b"\n") + _json(item))
 
     def copy_to(self, out: BinaryIO) -> None:
         self._file.seek(0)

@@ -15,10 +15,10 @@ from chainsim import Device, Outcome, complaint_of, shown, words_of
 
 from ..channels import Channel, Role
 from ..errors import UnreadableWaveform
-from ..files.whole import naming
+from ..files.whole import first_of_plain
 from ..formats.samples import SUFFIXES
 from .coupling import CouplingEvent
-from .manifest import FrameMark, Manifest
+from .manifest import MOST_BYTES, FrameMark, Manifest
 
 __all__ = ["read_manifest"]
 
@@ -92,8 +92,9 @@ def read_manifest(path: Path) -> Manifest:
         When it is not JSON, or a field is missing, of another type, or contradicts the device; the message
         is one line such as ``hello.json: frames[3].target: expected 6 rows of 6 numbers``.
     """
-    with naming(path):
-        raw = path.read_bytes()
+    raw = first_of_plain(path, MOST_BYTES + 1)
+    if len(raw) > MOST_BYTES:
+        raise UnreadableWaveform(f"{path}: more than {MOST_BYTES} bytes; a manifest has at most so many")
     try:
         data = json.loads(raw, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:

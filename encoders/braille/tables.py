@@ -83,6 +83,10 @@ def resolve_tables(spec: str) -> tuple[str, ...]:
     if _is_query(wish):
         return (_answer(wish),)
     tables = tuple(part.strip() for part in wish.split(",") if part.strip())
+    for name in tables:
+        # liblouis would wait for a pipe, and read a device without an end.
+        if os.path.exists(name) and not (os.path.isfile(name) or os.path.isdir(name)):
+            raise TableMissing(f"table {name!r}: a device or a pipe; give a file, or see 'dotwave tables'")
     if tables and louis_binding.compiles(tables):
         return tables
     raise TableMissing(_complaint(wish, tables))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reading import first_bytes
 from .errors import PictureBroken, PictureError, PictureTooLarge
 from .limits import BROKEN, PictureLimits
 from .vector import draw_svg
@@ -102,8 +103,7 @@ def read_picture(
 
 def _file_bytes(path: Path, limits: PictureLimits) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(limits.file_bytes + 1)
+        return first_bytes(path, limits.file_bytes + 1)
     except (OSError, ValueError) as error:
         raise PictureError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
 

@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from .errors import EmptyPicture, PictureBroken, PictureError, PictureTooLarge, RendererMissing
 from .limits import BROKEN, PictureLimits
-from .vector_weight import DEEPEST, STYLES, Weight, Weights
+from .vector_weight import BITMAP, DEEPEST, STYLES, Weight, Weights, weight_of_sheets
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -43,6 +43,7 @@ DROPPED = ("stroke-dash", "marker", "filter", "on")
 LARGEST = 1e6
 # What is told of a document with very many or very long names.
 MOST_NOTES, LONGEST_NAME = 20, 40
+# Of all embedded bitmaps together.
 EMBEDDED_PIXELS = 4_000_000
 EMBEDDED_LONGEST = 512
 
@@ -132,8 +133,8 @@ def _check(name: str, tamer: _Tamer, limits: PictureLimits) -> None:
         raise PictureTooLarge(f"{name}: draws more than {limits.svg_elements} elements; simplify the drawing")
     if drawn.points > limits.svg_points:
         raise PictureTooLarge(
-            f"{name}: its paths take as long as one of {drawn.points} points; at most {limits.svg_points} are drawn, "
-            "simplify the drawing"
+            f"{name}: it takes as long to draw as a path of {drawn.points} points; at most {limits.svg_points} are "
+            "drawn, simplify the drawing"
         )
     if not drawn.elements:
         left_out = f" ({'; '.join(tamer.notes)})" if tamer.notes else ""
@@ -148,15 +149,18 @@ class _Tamer:
         self.out: list[str] = []
         self.notes: dict[str, None] = {}
         self._open: list[str] = []
+        self._style: list[str] = []
+        self._sheets: list[str] = []
+        self._elements = self._deepest = 0
         self._weights = Weights()
         self._owners: list[str] = [""]
         self._draws = False
-        self._skipping = 0
+        self._skipping = self._embedded = 0
         self._length = 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """Write an element, or begin to skip it."""
-        if self._skipping:
+        if self._skipping or self._open[-1:] == ["style"]:
             self._skipping += 1
             return
         space, _, name = tag.rpartition("}")
@@ -181,6 +185,8 @@ class _Tamer:
             self._skipping = 1
             return
         self._open.append(name)
+        self._elements += 1
+        self._deepest = max(self._deepest, len(self._open))
         self._owners.append(attributes.get("id", "") or self._owners[-1])
         self._count(name, attributes)
         namespace = f' xmlns="{SVG}"' if len(self._open) == 1 else ""
@@ -192,12 +198,19 @@ class _Tamer:
             self._skipping -= 1
             return
         self._owners.pop()
+        self._end_style()
         self._write(f"</{self._open.pop()}>")
 
     def data(self, text: str) -> None:
-        """Keep style sheets; other text draws nothing."""
+        """Keep style sheets, which come in pieces; other text draws nothing."""
         if not self._skipping and self._open and self._open[-1] == "style":
-            text = self._css(text)
+            self._style.append(text)
+
+    def _end_style(self) -> None:
+        text = self._css("".join(self._style))
+        self._style.clear()
+        if text:
+            self._sheets.append(text)
             self._weights.add(STYLES, Weight(), self._links(text))
             self._write(escape(text))
 
@@ -206,7 +219,9 @@ class _Tamer:
 
     def drawn(self) -> Weight:
         """What is drawn in all, references followed; nothing when there is no shape."""
-        return self._weights.total() if self._draws else Weight()
+        if not self._draws:
+            return Weight()
+        return self._weights.total() + weight_of_sheets("\n".join(self._sheets), self._elements, self._deepest)
 
     def _note(self, words: str) -> None:
         if len(self.notes) < MOST_NOTES:
@@ -226,7 +241,10 @@ class _Tamer:
         if link.startswith("#"):
             links.append(link[1:])
         points = sum(len(_NUMBER.findall(attributes.get(key, ""))) for key in PATHS) // 2
-        self._weights.add(owner, Weight(1, points**2), [*links, STYLES])
+        # Declarations of one element are each held against all before.
+        declarations = attributes.get("style", "").count(";")
+        itself = BITMAP if name == "image" else Weight(1, points**2 + declarations**2)
+        self._weights.add(owner, itself, [*links, STYLES])
         if owner != parent:
             self._weights.add(parent, Weight(), [owner])
 
@@ -273,8 +291,9 @@ class _Tamer:
         try:
             raw = base64.b64decode(body) if head.endswith(";base64") else unquote_to_bytes(body)
             with Image.open(io.BytesIO(raw), formats=("PNG", "JPEG", "GIF", "WEBP")) as bitmap:
-                if bitmap.width * bitmap.height > EMBEDDED_PIXELS:
-                    raise PictureTooLarge(f"an embedded bitmap has more than {EMBEDDED_PIXELS} pixels; scale it down")
+                self._embedded += bitmap.width * bitmap.height
+                if self._embedded > EMBEDDED_PIXELS:
+                    raise PictureTooLarge(f"embedded bitmaps of more than {EMBEDDED_PIXELS} pixels; scale them down")
                 plain = bitmap.convert("RGBA")
         except PictureTooLarge:
             raise

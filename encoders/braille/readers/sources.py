@@ -8,7 +8,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import BinaryIO
 
-from ...errors import EmptyText, EncodeError, InvalidText, UnsupportedSource
+from ...errors import EmptyText, InvalidText, UnsupportedSource
+from ...reading import first_bytes
 from .brf import brf_to_cells
 
 __all__ = ["SourceKind", "TextSource"]
@@ -108,12 +109,10 @@ class TextSource:
         if suffix in _SUFFIXES:
             raise UnsupportedSource(f"{path}: {_SUFFIXES[suffix]} is not read; {_READ}")
         try:
-            with path.open("rb") as file:
-                return cls.of_stream(file, str(path), brf=suffix in {".brf", ".brl"})
+            data = first_bytes(path, MAX_BYTES + 1)
         except (OSError, ValueError) as error:
-            if isinstance(error, EncodeError):
-                raise
             raise UnsupportedSource(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        return cls._of_first(data, str(path), brf=suffix in {".brf", ".brl"})
 
     @classmethod
     def of_stream(cls, stream: BinaryIO, name: str = "standard input", *, brf: bool = False) -> TextSource:
@@ -122,6 +121,11 @@ class TextSource:
             data = stream.read(MAX_BYTES + 1)
         except OSError as error:
             raise UnsupportedSource(f"{name}: cannot be read: {error.strerror or error}") from None
+        return cls._of_first(data, name, brf=brf)
+
+    @classmethod
+    def _of_first(cls, data: bytes, name: str, *, brf: bool) -> TextSource:
+        """A source from the first bytes of something, which are one more than may be when it is too long."""
         if len(data) > MAX_BYTES:
             raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
         return cls.of_bytes(data, name, brf=brf)
