@@ -25,7 +25,7 @@ import encoders.reading
 from chainsim import ProfileError, first_bytes
 from chainsim.files.sweep_table import read_table
 from drivers import FileError, UnreadableWaveform, WaveformError, read_waveform
-from drivers.exchange import read_exchange
+from drivers.exchange.file import read_exchange
 from encoders import PictureError, TextSource, resolve_tables
 from encoders.errors import TableMissing
 
