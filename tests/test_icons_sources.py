@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tarfile
 import zipfile
 from pathlib import Path
@@ -74,6 +75,24 @@ def test_what_is_not_there_is_refused_in_one_line(tmp_path: Path) -> None:
         with pytest.raises(AppError, match=words) as caught:
             find_icons([str(tmp_path / source)])
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["", "a", "a/b"])
+def test_a_folder_that_cannot_be_read_is_said(name: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scandir, closed = os.scandir, {str(tree / name), str(tree / ".hidden")}
+
+    def scan(path: str):
+        if os.fspath(path) in closed:
+            raise PermissionError(13, "Permission denied", os.fspath(path))
+        return scandir(path)
+
+    # Permissions do not stop root, who may run this.
+    monkeypatch.setattr(os, "scandir", scan)
+    with pytest.raises(AppError) as caught:
+        find_icons([str(tree)])
+    assert str(caught.value) == (f"{tree / name}: the folder cannot be read: Permission denied; change its permissions")
+    closed.remove(str(tree / name))
+    assert len(find_icons([str(tree)])) == len(PICTURES)
 
 
 def test_a_damaged_member_is_reported_and_the_rest_read(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path, PurePosixPath
+from typing import NoReturn
 
-from drivers import naming
 from encoders import PictureLimits
 
 from ..errors import AppError
@@ -78,9 +78,7 @@ def _paths(source: str) -> Iterable[Path]:
 
 def _places(path: Path) -> Iterator[IconPlace]:
     if path.is_dir():
-        with naming(path):
-            below = [found.relative_to(path).as_posix() for found in path.rglob("*") if found.is_file()]
-        yield from (IconPlace(path, name) for name in below if _is_icon(name))
+        yield from (IconPlace(path, name) for name in _below(path) if _is_icon(name))
     elif path.name.lower().endswith(ARCHIVES):
         try:
             names = [name for name, _ in members(path)]
@@ -91,10 +89,25 @@ def _places(path: Path) -> Iterator[IconPlace]:
         yield IconPlace(path, "")
 
 
+def _below(folder: Path) -> Iterator[str]:
+    """Files in a folder and in those in it; pictures of one that cannot be read are not left out unsaid."""
+
+    def refuse(error: OSError) -> NoReturn:
+        raise AppError(f"{error.filename}: the folder cannot be read: {error.strerror}; change its permissions")
+
+    for place, folders, names in os.walk(folder, onerror=refuse):
+        folders[:] = [name for name in folders if not _is_hidden(name)]
+        files = (Path(place, name) for name in names)
+        yield from (file.relative_to(folder).as_posix() for file in files if file.is_file())
+
+
+def _is_hidden(part: str) -> bool:
+    return part.startswith((".", "__MACOSX")) and part not in {".", ".."}
+
+
 def _is_icon(name: str) -> bool:
     path = PurePosixPath(name)
-    hidden = any(part.startswith((".", "__MACOSX")) and part not in {".", ".."} for part in path.parts)
-    return path.suffix.lower() in SUFFIXES and not hidden
+    return path.suffix.lower() in SUFFIXES and not any(map(_is_hidden, path.parts))
 
 
 def read_icons(places: Iterable[IconPlace]) -> Iterator[IconFile]:
