@@ -35,11 +35,14 @@ def play(
     port: Annotated[str | None, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")] = None,
     live: Annotated[bool, typer.Option("--live", help="Really play; without it only the checks are made.")] = False,
     baud: Annotated[int | None, typer.Option(min=300, help="Bits per second; default: the controller's own.")] = None,
-    patience: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a controller not heard.")] = 10.0,
+    patience: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds to wait for a controller not heard; default: 10.")
+    ] = None,
     board: Annotated[BoardModel | None, typer.Option(help="A board that plays by itself, instead.")] = None,
-    firmware: Annotated[BoardFirmware, typer.Option(help="What runs on the board.")] = BoardFirmware.TEST_PIXEL,
+    firmware: Annotated[BoardFirmware | None, typer.Option(help="What runs on the board; default: test-pixel.")] = None,
     audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
-    channels: Annotated[str, typer.Option("--map", help="Sound card outputs: channel:output,...")] = "",
+    channels: Annotated[str | None, typer.Option("--map", help="Sound card outputs: channel:output,...")] = None,
+    to: Annotated[str | None, typer.Option(metavar="NAME:PLACE", help="Any sink, also one of another package.")] = None,
     as_json: Json = False,
 ) -> None:
     """Check a written waveform against the safety gate and, with --live, play it.
@@ -56,8 +59,8 @@ def play(
     from ..playing.play import play as run
 
     report = run(
-        Path(out), live=live, port=port, baud=baud, patience_s=patience, board=board is not None,
-        firmware=Firmware(firmware.value), audio=audio, mapping=channels,
+        Path(out), live=live, port=port, board=board is not None, audio=audio, to=to, baud=baud, patience_s=patience,
+        firmware=None if firmware is None else Firmware(firmware.value), mapping=channels,
     )  # fmt: skip
     finish(report, as_json, ok=report.ok)
 
