@@ -24,6 +24,11 @@ from .braille.readers.brf import (
     brf_to_cells as brf_to_cells,
     cells_to_brf as cells_to_brf,
 )
+from .braille.readers.formats import (
+    READERS as READERS,
+    Reader as Reader,
+    text_suffixes as text_suffixes,
+)
 from .braille.readers.sources import (
     SourceKind as SourceKind,
     TextSource as TextSource,

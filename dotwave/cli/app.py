@@ -19,7 +19,7 @@ import typer
 
 from ..errors import Terminated
 from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
-from .completion import completed_devices, completed_files
+from .completion import completed_devices, completed_files, completed_texts
 from .ending import ended
 from .help import LOOK, RENDER, SET_UP, STUDY, Commands
 from .options import Dots, Presentation, SampleFormat, Undefined
@@ -50,7 +50,7 @@ def text(
         typer.Argument(
             metavar="TEXT|FILE|-",
             help="A file if it exists, - for stdin, else words.",
-            autocompletion=completed_files(".txt", ".brf", ".brl"),
+            autocompletion=completed_texts(),
         ),
     ],
     device: Device = "paper-6x6",

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .command import Json, finish
-from .completion import completed_devices, completed_files
+from .completion import completed_devices, completed_texts
 from .help import STUDY
 
 __all__ = ["plan_app"]
@@ -20,7 +20,7 @@ Source = Annotated[
     typer.Argument(
         metavar="JOB.yaml|TEXT|FILE|-",
         help="A job file, or a text as `dotwave text`.",
-        autocompletion=completed_files(".yaml", ".yml", ".txt", ".brf", ".brl"),
+        autocompletion=completed_texts(".yaml", ".yml"),
     ),
 ]
 Profile = Annotated[
