@@ -140,6 +140,7 @@ from .waveform.coupling import (
     CouplingEvent as CouplingEvent,
 )
 from .waveform.file import (
+    WAVEFORMS_VERSION as WAVEFORMS_VERSION,
     WrittenWaveform as WrittenWaveform,
     read_waveform as read_waveform,
     write_waveform as write_waveform,

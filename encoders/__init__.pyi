@@ -84,6 +84,7 @@ from .picture.options import (
     Threshold as Threshold,
 )
 from .picture.pictures import (
+    PICTURES_VERSION as PICTURES_VERSION,
     PictureReport as PictureReport,
     PictureScene as PictureScene,
     encode_picture as encode_picture,

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .analysis.questions import Question, TradeoffError, questions_of, seconds_words
     from .analysis.requirement import Requirement, RequirementError, Term, require
     from .analysis.tradeoff import Choice, Tradeoff, TradeoffRow, trade_off
+    from .cache import PLANS_VERSION
     from .identification.calibration import ChainFit, Sweep, SweepError, fit_chain
     from .outlook import FrameSpread, TradePoint
     from .robustness.robust import (
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DEFAULT_CONTRAST_DB",
+    "PLANS_VERSION",
     "Accuracy",
     "ChainFit",
     "ChainState",
@@ -92,6 +94,7 @@ __all__ = [
 ]
 
 _LATE = {
+    "PLANS_VERSION": "cache",
     "walking_rate_hz": "waves.walking",
     "TradePoint": "outlook",
     "FrameSpread": "outlook",

@@ -22,7 +22,10 @@ from .manifest import Manifest, ManifestWriter, digest_of_open
 from .manifest_reader import read_manifest
 from .sampling import Waveform
 
-__all__ = ["WrittenWaveform", "read_waveform", "write_waveform"]
+__all__ = ["WAVEFORMS_VERSION", "WrittenWaveform", "read_waveform", "write_waveform"]
+
+WAVEFORMS_VERSION = 1
+"""One more whenever a plan gives other samples or another manifest: waveforms of icons are then written anew."""
 
 BLOCK = 4096
 
