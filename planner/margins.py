@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Response
 
 from .closed_forms.links import stages
-from .closed_forms.wave_fit import Hold
 from .plan import Margins
+
+if TYPE_CHECKING:
+    from .closed_forms.wave_fit import Hold
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
 

@@ -13,12 +13,12 @@ import pytest
 import typer.main
 
 from chainsim import device_names
-from dotwave.cli.app import app
+from dotwave.cli.app import application
 from dotwave.cli.completion import completed_devices, completed_files
 from dotwave.cli.help import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = typer.main.get_command(application()).commands
 
 
 def test_every_command_stands_in_one_group_of_the_help(dotwave) -> None:

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from dotwave.cli.app import app
+from dotwave.cli.app import application
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS = typer.main.get_command(application()).commands  # type: ignore[attr-defined]
 
 each_command = pytest.mark.parametrize("name", sorted(COMMANDS))
 

@@ -30,7 +30,7 @@ Bits = Annotated[int, Field(ge=1, le=32)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class Span(_Part):

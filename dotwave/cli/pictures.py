@@ -13,9 +13,9 @@ from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
 
-__all__ = ["picture_app"]
+__all__ = ["commands"]
 
-picture_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
 
 PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
 ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
@@ -24,7 +24,7 @@ Contrast = Annotated[
 ]
 
 
-@picture_app.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
+@commands.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
 def image(
     files: Annotated[
         list[Path],
@@ -73,7 +73,7 @@ def image(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
+@commands.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
 def icons(
     sources: Annotated[
         list[str],
@@ -123,7 +123,7 @@ def icons(
     finish(report, as_json, ok=report.ok)
 
 
-@picture_app.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
+@commands.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
 def render(
     job: Annotated[
         Path,
@@ -164,7 +164,7 @@ def render(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
+@commands.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them.
 

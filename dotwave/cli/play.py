@@ -11,9 +11,9 @@ import typer
 from .command import Device, Json, Written, finish
 from .help import PLAY
 
-__all__ = ["play_app"]
+__all__ = ["commands"]
 
-play_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
 
 
 class BoardModel(StrEnum):
@@ -29,7 +29,7 @@ class BoardFirmware(StrEnum):
     CORRECTED = "corrected"
 
 
-@play_app.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
+@commands.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
 def play(
     out: Written,
     port: Annotated[str | None, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")] = None,
@@ -65,7 +65,7 @@ def play(
     finish(report, as_json, ok=report.ok)
 
 
-@play_app.command(short_help="List serial ports.", rich_help_panel=PLAY)
+@commands.command(short_help="List serial ports.", rich_help_panel=PLAY)
 def ports(as_json: Json = False) -> None:
     """List the serial ports of this machine.
 
@@ -78,7 +78,7 @@ def ports(as_json: Json = False) -> None:
     finish(list_ports(), as_json, ok=True)
 
 
-@play_app.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
+@commands.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
 def emulate(
     device: Device = "paper-6x6",
     link: Annotated[Path | None, typer.Option(help="A stable name for the port (a symbolic link).")] = None,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Outcome, Setting, solve
+from chainsim import Closure, Outcome, Setting
 
 from ..closed_forms.links import stages
 from ..margins import WELL_SHARE
@@ -59,6 +59,9 @@ class Deflection(Strategy):
 
     def states(self, targets: Floats) -> list[ChainState]:
         """Static settings for `targets`, checked by the static solver."""
+        # Imported here: what was planned before comes from the cache, and needs no solver.
+        from chainsim import solve
+
         device = self.device
         biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
         step = device.amplifier.volt_step * device.bias_per_volt
