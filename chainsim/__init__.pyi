@@ -111,8 +111,10 @@ from .reach.ladder import (
     solve as solve,
 )
 from .rung import (
+    DEFLECTION as DEFLECTION,
     RUNGS as RUNGS,
     TERMS as TERMS,
+    VIBRATION as VIBRATION,
     Rung as Rung,
     RungError as RungError,
     Start as Start,
