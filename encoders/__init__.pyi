@@ -79,9 +79,11 @@ from .picture.options import (
     Invert as Invert,
     Output as Output,
     PictureOptions as PictureOptions,
+    PictureRule as PictureRule,
     RegionsBy as RegionsBy,
     Style as Style,
     Threshold as Threshold,
+    picture_rules as picture_rules,
 )
 from .picture.pictures import (
     PICTURES_VERSION as PICTURES_VERSION,
