@@ -113,8 +113,10 @@ from .reach.ladder import (
 )
 from .reading import first_bytes as first_bytes
 from .rung import (
+    DEFLECTION as DEFLECTION,
     RUNGS as RUNGS,
     TERMS as TERMS,
+    VIBRATION as VIBRATION,
     Rung as Rung,
     RungError as RungError,
     Start as Start,

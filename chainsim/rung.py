@@ -13,7 +13,7 @@ from .equations.chain import Chain, Setting
 from .errors import ChainError
 from .model.response import Response
 
-__all__ = ["MAX_PERIODS", "RUNGS", "TERMS", "Rung", "RungError", "Start", "load_rung"]
+__all__ = ["DEFLECTION", "MAX_PERIODS", "RUNGS", "TERMS", "VIBRATION", "Rung", "RungError", "Start", "load_rung"]
 
 RUNGS = {
     "static": ("chainsim.harmonic_balance.static", "StaticRung"),
@@ -27,6 +27,8 @@ RUNGS = {
 
 TERMS = frozenset({"nonlinearity", "third harmonic", "preload"})
 """Terms of a steady state that a rung may have beside the linear chain's."""
+
+DEFLECTION, VIBRATION = "deflection", "vibration"
 
 MAX_PERIODS = 60_000
 """Drive periods of the full equations after which a setting is out of budget: 75 e-folds at Q = 250."""
@@ -57,8 +59,11 @@ class Rung(ABC):
     3. `valid`, in words, where it is true;
     4. `models`, which terms of the equation it has, of those in `TERMS`;
     5. `lists_branches`, whether start ``all`` gives every branch; False unless said;
-    6. `refusal`, one sentence why it cannot answer this question, or "" when it can;
-    7. `steady`, the work itself;
+    6. `answers`, what it is for, of `DEFLECTION` (nothing vibrates) and `VIBRATION`; vibrations unless said;
+    7. `adjustable`, whether it works until `tol` is met; False, it gives what it has, unless said;
+    8. `full_equations`, whether it follows them from rest, by compiled code; False unless said;
+    9. `refusal`, one sentence why it cannot answer this question, or "" when it can;
+    10. `steady`, the work itself;
 
     and a line in `RUNGS`, at the place that its price gives it.
 
@@ -79,6 +84,9 @@ class Rung(ABC):
     valid: ClassVar[str]
     models: ClassVar[frozenset[str]]
     lists_branches: ClassVar[bool] = False
+    answers: ClassVar[frozenset[str]] = frozenset({VIBRATION})
+    adjustable: ClassVar[bool] = False
+    full_equations: ClassVar[bool] = False
 
     @abstractmethod
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:

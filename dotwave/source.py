@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from encoders import TextSource
+from encoders import TextSource, text_suffixes
 
 from .errors import AppError
 
@@ -57,7 +57,7 @@ def standard_input() -> BinaryIO:
 
 def _looks_like_path(argument: str) -> bool:
     spaced = any(character.isspace() for character in argument)
-    return not spaced and ("/" in argument or argument.lower().endswith((".txt", ".brf")))
+    return not spaced and ("/" in argument or argument.lower().endswith(text_suffixes()))
 
 
 def simulation_source(argument: str) -> Path | Simulation:

@@ -99,6 +99,11 @@ from .sinks.audio import (
     parse_outputs as parse_outputs,
     play_audio as play_audio,
 )
+from .sinks.base import (
+    Sink as Sink,
+    SinkError as SinkError,
+    SinkReport as SinkReport,
+)
 from .sinks.board_serial import (
     BOARD_BAUD as BOARD_BAUD,
     BoardEmulator as BoardEmulator,
@@ -108,6 +113,13 @@ from .sinks.board_serial import (
 )
 from .sinks.drv2667 import (
     BoardRefusal as BoardRefusal,
+)
+from .sinks.opening import (
+    SINKS as SINKS,
+    Checked as Checked,
+    OpenSink as OpenSink,
+    open_sink as open_sink,
+    sink_names as sink_names,
 )
 from .sinks.serial_play import (
     NoAnswer as NoAnswer,
@@ -128,6 +140,7 @@ from .waveform.coupling import (
     CouplingEvent as CouplingEvent,
 )
 from .waveform.file import (
+    WAVEFORMS_VERSION as WAVEFORMS_VERSION,
     WrittenWaveform as WrittenWaveform,
     read_waveform as read_waveform,
     write_waveform as write_waveform,

@@ -24,6 +24,11 @@ from .braille.readers.brf import (
     brf_to_cells as brf_to_cells,
     cells_to_brf as cells_to_brf,
 )
+from .braille.readers.formats import (
+    READERS as READERS,
+    Reader as Reader,
+    text_suffixes as text_suffixes,
+)
 from .braille.readers.sources import (
     SourceKind as SourceKind,
     TextSource as TextSource,
@@ -74,11 +79,14 @@ from .picture.options import (
     Invert as Invert,
     Output as Output,
     PictureOptions as PictureOptions,
+    PictureRule as PictureRule,
     RegionsBy as RegionsBy,
     Style as Style,
     Threshold as Threshold,
+    picture_rules as picture_rules,
 )
 from .picture.pictures import (
+    PICTURES_VERSION as PICTURES_VERSION,
     PictureReport as PictureReport,
     PictureScene as PictureScene,
     encode_picture as encode_picture,

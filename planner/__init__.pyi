@@ -26,6 +26,7 @@ from .analysis.tradeoff import (
     TradeoffRow as TradeoffRow,
     trade_off as trade_off,
 )
+from .cache import PLANS_VERSION as PLANS_VERSION
 from .drive import (
     DriveTone as DriveTone,
     FirstOrderHold as FirstOrderHold,

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,10 @@ from .operating_point import OperatingPoint
 from .packed import packed, unpacked
 from .plan import Ramp
 
-__all__ = ["PlanCache", "cache_path"]
+__all__ = ["PLANS_VERSION", "PlanCache", "cache_path"]
+
+PLANS_VERSION = 1
+"""One more whenever planning, or the simulator under it, gives other numbers: what was kept before is not found."""
 
 # How long another process may write before the cache is not waited for.
 PATIENCE_S = 2.0
@@ -30,19 +32,8 @@ def cache_path() -> Path:
     return base / "plans.sqlite"
 
 
-@cache
-def _code_digest() -> bytes:
-    """Digest of the code that plans: what another version planned is not found."""
-    digest = hashlib.sha256()
-    here = Path(__file__).parent
-    for folder in (here, here.parent / "chainsim"):
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.digest()
-
-
 class PlanCache:
-    """States and ramps by everything they depend on: the device, the contrast, the targets and this code.
+    """States and ramps by everything they depend on: the device, the contrast, the targets and `PLANS_VERSION`.
 
     What is damaged is not found and kept anew; a cache that cannot be read or written never finds anything. The log
     says so once, and planning goes on.
@@ -54,7 +45,7 @@ class PlanCache:
         for words in ("name", "description", "notes"):
             profile.pop(words)
         text = json.dumps([profile, contrast_db], sort_keys=True)
-        self._scope = hashlib.sha256(_code_digest() + text.encode()).digest()
+        self._scope = hashlib.sha256(f"{PLANS_VERSION} {text}".encode()).digest()
         if whole is not None:
             self._scope = hashlib.sha256(whole._scope + self._scope).digest()
         self._file: CacheFile = CacheFile(cache_path(), PATIENCE_S) if whole is None else whole._file

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,9 @@ from chainsim import Closure, Device, Response
 
 from .closed_forms.links import stages
 from .operating_point import Margins, OperatingPoint
+
+if TYPE_CHECKING:
+    pass
 
 __all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from chainsim import Device, Outcome
 from encoders import Frame
 
 from .operating_point import OperatingPoint
-from .outlook import FrameSpread
+
+if TYPE_CHECKING:
+    from .outlook import FrameSpread
 
 __all__ = ["FramePlan", "Plan", "Ramp", "ToneRamp"]
 

@@ -107,6 +107,15 @@ def test_files_that_are_no_profile(tmp_path, text, says):
     assert says in str(caught.value)
 
 
+def test_a_file_that_is_edited_is_read_anew(tmp_path):
+    path = written(tmp_path, profile(name="mine", rows=4))
+    assert load_device(path).rows == 4
+    assert written(tmp_path, profile(name="mine", rows=3)) == path
+    assert load_device(path).rows == 3
+    # What nobody edits is read once.
+    assert load_device("paper-6x6") is load_device("paper-6x6")
+
+
 def test_names_that_lead_nowhere(tmp_path):
     with pytest.raises(ProfileError, match="linked-6x6, paper-6x6"):
         load_device("nosuch")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import RUNGS, TERMS, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
+from chainsim import DEFLECTION, RUNGS, TERMS, VIBRATION, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
 
 CHAIN = Chain(3, 0.05, -1.0)
 
@@ -98,6 +98,10 @@ def test_every_rung_states_its_claims(name):
     assert rung.order
     assert rung.valid
     assert rung.models <= TERMS
+    assert rung.answers
+    assert rung.answers <= {DEFLECTION, VIBRATION}
+    assert rung.adjustable == (name in {"harmonic_balance", "ode"})
+    assert rung.full_equations == (name == "ode")
     assert rung.lists_branches == (rung.refusal(CHAIN, FEW, Start.ALL) == "" and name != "linear")
     assert rung.refusal(CHAIN, Setting.of(CHAIN, epsilon=1e-3, lam=0.2, omega=1.2), Start.REST) == ""
 

@@ -141,7 +141,7 @@ def test_a_signal_ends_the_command_and_cleans_up(tmp_path: Path, number: int) ->
     code = f"""
 import signal, sys, types
 from pathlib import Path
-from dotwave.cli import main
+from dotwave.cli.app import main
 def verify(path):
     partial = Path({str(partial)!r})
     try:
@@ -239,7 +239,7 @@ def test_text_argument_that_is_not_text(argument: str) -> None:
 def modules_after(*arguments: str, cwd: Path) -> set[str]:
     """Top-level modules a command imported, from a process of its own."""
     code = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); "
-    code += "from dotwave.cli import main; main()"
+    code += "from dotwave.cli.app import main; main()"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", code, *arguments]
     ran = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True)

@@ -13,12 +13,12 @@ import pytest
 import typer.main
 
 from chainsim import device_names
-from dotwave.cli.app import app
+from dotwave.cli.app import application
 from dotwave.cli.completion import completed_devices, completed_files
 from dotwave.cli.help import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = typer.main.get_command(application()).commands
 
 
 def test_every_command_stands_in_one_group_of_the_help(dotwave) -> None:
@@ -64,7 +64,7 @@ def offered(words: str, folder: Path, shell: str = "bash") -> subprocess.Complet
         "_TYPER_COMPLETE_FISH_ACTION": "get-args",
     }  # fmt: skip
     code = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); "
-    code += "from dotwave.cli import main; main()"
+    code += "from dotwave.cli.app import main; main()"
     command = [sys.executable, "-c", code]
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 

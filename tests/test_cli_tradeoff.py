@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from dotwave.cli.plan import plan_app
+from dotwave.cli.plan import commands
 from dotwave.errors import AppError
 from dotwave.request import seconds_of
 from drivers import FileError
@@ -24,7 +24,7 @@ sequence:
 
 
 def run(*arguments):
-    return CliRunner().invoke(plan_app, [str(one) for one in arguments], catch_exceptions=False)
+    return CliRunner().invoke(commands, [str(one) for one in arguments], catch_exceptions=False)
 
 
 @pytest.fixture

@@ -18,9 +18,10 @@ import pytest
 from chainsim import load_device
 from dotwave.errors import AppError
 from dotwave.playing.emulate import EmulateReport, dots_as_braille, emulate, parse_window
-from dotwave.playing.play import buffer_notes, list_ports, play
+from dotwave.playing.play import list_ports, play
 from drivers import BoardEmulator, BoardRefusal, Faults, Firmware, StreamReport, Window, read_waveform, write_waveform
 from drivers.protocol.pty_line import PtyLine
+from drivers.sinks.controller import buffer_notes
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import plan_scene
 
@@ -38,7 +39,7 @@ def test_without_live_nothing_is_opened(tmp_path: Path) -> None:
     path = written(tmp_path, "paper-6x6")
     report = play(path, live=False, port=str(tmp_path / "no such port"))
     assert not report.live
-    assert report.stream is None
+    assert "stream" not in report.as_dict()
     assert "dry run, nothing was sent" in report.as_text()
     plain = json.loads(json.dumps(report.as_dict(), allow_nan=False))
     assert plain["gate"]["volts"] == pytest.approx(73.26, abs=0.1)
@@ -51,6 +52,10 @@ def test_live_needs_one_sink(tmp_path: Path) -> None:
         play(path, live=True)
     with pytest.raises(AppError, match="not both"):
         play(path, live=True, port="x", audio="0")
+    with pytest.raises(AppError, match="not both"):
+        play(path, live=True, to="controller:x", port="x")
+    with pytest.raises(AppError, match="give one of"):
+        play(path, live=True, board=True)
 
 
 @pytest.mark.parametrize("device", ["paper-6x6", "independent-6x6"])
@@ -74,8 +79,7 @@ def test_two_terminals(tmp_path: Path, device: str) -> None:
         thread.join()
     (there,) = found
     assert report.ok
-    assert report.stream is not None
-    assert report.stream.samples == round(report.duration_s * report.rate_hz)
+    assert report.as_dict()["stream"]["samples"] == round(report.duration_s * report.rate_hz)
     assert "underruns" in report.as_text()
     assert json.loads(json.dumps(report.as_dict(), allow_nan=False))["stream"]["lost_s"] == 0
     assert there.status.recorded == 1
@@ -97,7 +101,6 @@ def test_a_small_buffer_is_told() -> None:
 def test_the_board_is_planned_and_refused(tmp_path: Path) -> None:
     path = written(tmp_path, "independent-6x6")
     report = play(path, live=False, board=True)
-    assert report.board is not None
     assert "loading" in report.as_text()
     records = report.as_dict()["board"]["frames"][0]["records"]
     assert {len(record["bytes"][0]) for record in records} == {4}

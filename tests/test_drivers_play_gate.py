@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from chainsim import Device, load_device
-from drivers import UnreadableWaveform, WavWriter, channels_of, read_waveform
+from dotwave.playing.play import play
+from drivers import UnreadableWaveform, WavWriter, channels_of, open_sink, read_waveform
 from drivers.safety import Gate, GateLimits, GateRefusal, GateReport, pass_gate
 from drivers.waveform.manifest import digest_of
 
@@ -145,15 +146,15 @@ def test_each_limit_refuses_what_breaks_it_alone(tmp_path: Path, case: Case) -> 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_what_is_refused_never_reaches_a_port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: Case) -> None:
-    import dotwave.playing.play
-
     opened: list[object] = []
-    for sink in ("Uart", "play_audio"):
-        monkeypatch.setattr(dotwave.playing.play, sink, lambda *given, **_: opened.append(given))
+    for place in ("controller.Uart", "board.Uart", "audio.play_audio"):
+        monkeypatch.setattr(f"drivers.sinks.{place}", lambda *given, **_: opened.append(given))
     path = written(tmp_path, case.volts(), lam=case.lam)
-    for options in ({"port": "/dev/ttyACM0"}, {"audio": "0"}):
+    for address in ("controller:/dev/ttyACM0", "drv2667:/dev/ttyUSB0", "audio:0"):
         with pytest.raises(GateRefusal, match="nothing was sent"):
-            dotwave.playing.play.play(path, live=True, limits=case.limits, **options)
+            play(path, live=True, limits=case.limits, to=address)
+        with open_sink(address, limits=case.limits) as sink, pytest.raises(GateRefusal, match="nothing was sent"):
+            sink.play(*read_waveform(path))
     assert not opened
 
 

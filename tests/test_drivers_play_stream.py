@@ -25,7 +25,6 @@ from drivers.protocol.messages import FULL_CODE
 from drivers.protocol.outgoing import session_messages
 from drivers.protocol.playout import ControllerSpec, OutputBlock
 from drivers.protocol.virtual_controller import VirtualController
-from drivers.safety import GateLimits, pass_gate
 from drivers.sinks.serial_play import NoAnswer, run_session
 from drivers.sinks.uart import PortUnavailable, Uart, serial_ports
 from encoders import Frame, TargetPattern
@@ -130,10 +129,8 @@ def emulated(device: Device, clock: SharedClock, **options: object) -> Iterator[
 
 def play_to(port: str, path: Path, clock: SharedClock, *, patience_s: float = 10.0) -> StreamReport:
     manifest, reader = read_waveform(path)
-    limits = GateLimits.of(manifest.device, len(manifest.channels))
-    pass_gate(manifest, reader, limits)
     session = HostSession(
-        lambda found: session_messages(manifest, reader, found, session=42, limits=limits), session=42, timing=Timing()
+        lambda found: session_messages(manifest, reader, found, session=42), session=42, timing=Timing()
     )
     run_session(session, lambda: Uart(port), patience_s=patience_s, clock=clock.host)
     return session.report
@@ -233,18 +230,10 @@ def test_nobody_answers(tmp_path: Path) -> None:
 
 HOST = """
 import sys
-from drivers import read_waveform
-from drivers.safety import GateLimits
-from drivers.protocol.outgoing import session_messages
-from drivers.sinks.serial_play import run_session
-from drivers.protocol.host_session import HostSession, Timing
-from drivers.sinks.uart import Uart
+from drivers import open_sink, read_waveform
 
-manifest, reader = read_waveform(sys.argv[2])
-limits = GateLimits.of(manifest.device, len(manifest.channels))
-make = lambda found: session_messages(manifest, reader, found, session=9, limits=limits)
-session = HostSession(make, session=9, timing=Timing())
-run_session(session, lambda: Uart(sys.argv[1]), patience_s=5.0)
+with open_sink(f"controller:{sys.argv[1]}", patience_s=5.0) as sink:
+    sink.play(*read_waveform(sys.argv[2]))
 """
 
 
@@ -309,8 +298,7 @@ def test_links_that_change_leave_the_store_full(tmp_path: Path) -> None:
     scene = encode_text(TextSource.of_text("Hello you"), GridShape(6, 6), TextOptions(dwell_s=0.5))
     write_waveform(plan_scene(scene, device), tmp_path / "sent.wav")
     manifest, reader = read_waveform(tmp_path / "sent.wav")
-    limits = GateLimits.of(device, len(manifest.channels))
-    make = partial(session_messages, manifest, reader, session=42, limits=limits)
+    make = partial(session_messages, manifest, reader, session=42)
     session = HostSession(make, session=42, timing=Timing())
     controller = VirtualController(ControllerSpec.of(device, buffer_s=0.5), now=now)
     session.connected()

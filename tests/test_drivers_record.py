@@ -26,7 +26,6 @@ from drivers.protocol.outgoing import End, Message, session_messages
 from drivers.protocol.playout import ControllerSpec
 from drivers.protocol.record import ArrivalRecorder, CutShort
 from drivers.protocol.virtual_controller import VirtualController
-from drivers.safety import GateLimits
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import plan_scene
 
@@ -47,7 +46,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def messages(path: Path, device: Device = DEVICE) -> Iterator[Message]:
     manifest, reader = read_waveform(path)
     found = VirtualController(ControllerSpec.of(device, buffer_s=1.0), now=0.0)._capabilities()
-    return session_messages(manifest, reader, found, session=7, limits=GateLimits.of(device, len(manifest.channels)))
+    return session_messages(manifest, reader, found, session=7)
 
 
 def take(recorder: ArrivalRecorder, messages: Iterator[Message]) -> None:

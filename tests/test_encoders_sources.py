@@ -1,11 +1,23 @@
 """What is read, what is refused, and the place of what is broken."""
 
 import io
+import sys
 from pathlib import Path
 
 import pytest
 
-from encoders import EmptyText, EncodeError, InvalidText, SourceKind, TextSource, UnsupportedSource
+from dotwave.cli.completion import completed_texts
+from encoders import (
+    READERS,
+    EmptyText,
+    EncodeError,
+    InvalidText,
+    Reader,
+    SourceKind,
+    TextSource,
+    UnsupportedSource,
+    text_suffixes,
+)
 
 
 def test_bom_and_line_ends():
@@ -57,7 +69,7 @@ def test_half_a_surrogate_pair_is_refused():
 
 def test_bad_brf_names_file_and_offset():
     with pytest.raises(InvalidText, match=r"x.brf: not ASCII Braille at byte 1"):
-        TextSource.of_bytes(b"A\xe9", "x.brf", brf=True)
+        TextSource.of_bytes(b"A\xe9", "x.brf", suffix=".brf")
 
 
 @pytest.mark.parametrize(
@@ -90,6 +102,40 @@ def test_other_suffixes_are_refused(tmp_path: Path, suffix):
 def test_an_absent_file_is_one_line(tmp_path: Path):
     with pytest.raises(UnsupportedSource, match=r"nowhere.txt: cannot be read: No such file"):
         TextSource.of_path(tmp_path / "nowhere.txt")
+
+
+def reversed_text(data: bytes) -> str:
+    """A format of its own for the next test: the characters from last to first behind two bytes of zip."""
+    if not data.startswith(b"PK"):
+        raise InvalidText("no PK at byte 0")
+    return data[4:].decode()[::-1]
+
+
+def test_a_format_is_one_function_and_one_entry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dotwave):
+    path = tmp_path / "file.docx"
+    path.write_bytes(b"PK\x03\x04olleH")
+    with pytest.raises(UnsupportedSource, match="DOCX is not read"):
+        TextSource.of_path(path)
+    monkeypatch.setitem(sys.modules, "another_reader", sys.modules[__name__])
+    entry = Reader("a DOCX file", (".docx",), "another_reader:reversed_text", (b"PK\x03\x04",))
+    monkeypatch.setattr("encoders.braille.readers.formats.READERS", (*READERS, entry))
+    assert TextSource.of_path(path).text == "Hello"
+    # By its content where no name tells.
+    assert TextSource.of_stream(io.BytesIO(path.read_bytes())).text == "Hello"
+    path.write_bytes(b"Hello")
+    with pytest.raises(InvalidText, match=r"file.docx: no PK at byte 0"):
+        TextSource.of_path(path)
+    # Messages, missing files and completion know of it.
+    with pytest.raises(UnsupportedSource, match="give UTF-8 text, Unicode Braille, a BRF file or a DOCX file"):
+        TextSource.of_bytes(b"%PDF-1.7")
+    assert "lost.docx: no such file" in dotwave("text", "lost.docx").err
+    monkeypatch.chdir(tmp_path)
+    assert completed_texts()("fi") == ["file.docx"]
+
+
+def test_endings_of_texts_that_are_missing_are_paths(dotwave):
+    for suffix in text_suffixes():
+        assert f"lost{suffix}: no such file" in dotwave("text", f"lost{suffix}").err
 
 
 def test_errors_share_a_root_and_a_builtin():

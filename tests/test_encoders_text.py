@@ -162,7 +162,7 @@ def test_braille_and_brf_pass_through():
     assert [frame.cells for frame in scene.frames] == ["⠠⠓⠑\n⠇⠇⠕", "⠀⠸⠺\n⠀⠀⠀"]
     assert scene.encoding["kind"] == "braille"
     assert scene.text_frames.check().ok
-    brf = TextSource.of_bytes(b",HELLO _W\x0c#ABC", brf=True)
+    brf = TextSource.of_bytes(b",HELLO _W\x0c#ABC", suffix=".brf")
     assert [frame.cells.replace("\n", "") for frame in encode_text(brf, GRID, TextOptions()).frames] == [
         "⠠⠓⠑⠇⠇⠕", "⠀⠸⠺⠀⠀⠀", "⠼⠁⠃⠉⠀⠀",
     ]  # fmt: skip

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from dotwave.cli.app import app
+from dotwave.cli.app import application
+from encoders import picture_rules
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS = typer.main.get_command(application()).commands  # type: ignore[attr-defined]
 
 each_command = pytest.mark.parametrize("name", sorted(COMMANDS))
 
@@ -40,6 +41,18 @@ def test_readme_shows_every_option() -> None:
         for parameter in command.params:
             long = [option for option in parameter.opts if option.startswith("--")]
             assert all(f"`{option}" in README for option in long), f"{name}: {long}"
+
+
+def test_readme_and_help_show_every_choice_of_a_picture() -> None:
+    table = README[README.index("| option of `image` |") :]
+    options = {option: one for one in COMMANDS["image"].params for option in one.opts}
+    for name, rule in picture_rules().items():
+        option = f"--{'as' if name == 'output' else name}"
+        if not rule.choices or option not in options:
+            continue
+        row = next(line for line in table.splitlines() if line.startswith(f"| `{option}`"))
+        assert all(f"`{word}`" in row for word in rule.choices), row
+        assert ", ".join(rule.choices) in options[option].help
 
 
 def test_readme_knows_only_commands_that_exist() -> None:

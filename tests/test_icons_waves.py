@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dotwave.icon_sets.journal import Journal
+
 from dotwave.icon_sets.build import IconOptions, render_icons
+from dotwave.icon_sets.journal import Journal
 
 ICON = str(Path(__file__).resolve().parent.parent / "samples" / "icons" / "heart.svg")
 SHORT = IconOptions(device="independent-6x6", workers=1, waveforms=True, dwell_s=0.2)

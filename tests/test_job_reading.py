@@ -7,10 +7,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 import yaml
+from pydantic import ValidationError
 
 from chainsim import ProfileError, load_device
-from dotwave.jobs.job import Job, job_schema, read_job
-from encoders import GridShape, Region as TextureRegion, plane_wave, regions
+from dotwave.jobs.job import Job, PicturePart, job_schema, read_job
+from encoders import GridShape, Region as TextureRegion, picture_rules, plane_wave, regions
 
 JOBS = sorted((Path(__file__).resolve().parent.parent / "samples" / "jobs").glob("*.yaml"))
 
@@ -189,3 +190,23 @@ def test_the_schema_refuses_what_the_reader_refuses(text: str) -> None:
 )
 def test_tolerances_by_name_and_number(tmp_path: Path, words: str, tol: float) -> None:
     assert read_job(written(tmp_path, f"tolerance: {words}\nsequence: [{{pause_s: 1}}]")).tol == tol
+
+
+def test_a_picture_has_the_options_of_the_encoder_with_their_ranges_and_defaults() -> None:
+    part = PicturePart(file="x.png")
+    told = {name: getattr(part, name) for name in PicturePart.model_fields if name != "file"}
+    rules = {name: rule for name, rule in picture_rules().items() if name not in {"pitch_m", "candidates"}}
+    assert told == {name: rule.default for name, rule in rules.items()}
+    ranged = 0
+    for name, rule in rules.items():
+        if rule.span is not None:
+            ranged += 1
+            for good in (rule.span.low, rule.span.high):
+                number = int(good) if isinstance(rule.default, int) else good
+                assert getattr(PicturePart(file="x.png", **{name: number}), name) == number
+            for bad in (rule.span.low - 1, rule.span.high + 1):
+                with pytest.raises(ValidationError, match=name):
+                    PicturePart(file="x.png", **{name: bad})
+        for word in rule.choices:
+            assert getattr(PicturePart(file="x.png", **{name: word}), name) == word
+    assert ranged == 10

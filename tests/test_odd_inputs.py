@@ -13,21 +13,21 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import drivers.waveform.manifest
 import pytest
-from dotwave.icon_sets.archives import members
-from dotwave.icon_sets.journal import Journal
-from dotwave.studies.sweep_files import Parts
-from encoders.picture.reading import read_picture
 
 import chainsim.reading
+import drivers.waveform.manifest
 import encoders.reading
 from chainsim import ProfileError, first_bytes
 from chainsim.files.sweep_table import read_table
+from dotwave.icon_sets.archives import members
+from dotwave.icon_sets.journal import Journal
+from dotwave.studies.sweep_files import Parts
 from drivers import FileError, UnreadableWaveform, WaveformError, read_waveform
 from drivers.exchange.file import read_exchange
 from encoders import PictureError, TextSource, resolve_tables
 from encoders.errors import TableMissing
+from encoders.picture.reading import read_picture
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
 

@@ -23,7 +23,7 @@ from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import FramePlan, OperatingPoint, Ramp, plan_scene
 from planner.amplitudes.deflection import Deflection
 from planner.amplitudes.vibration import Vibration
-from planner.cache import PlanCache, cache_path
+from planner.cache import PLANS_VERSION, PlanCache, cache_path
 from planner.family import AmplitudeFamily
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -137,10 +137,10 @@ def test_another_name_does_hit(work: dict[str, int]) -> None:
     assert work == before
 
 
-def test_other_code_does_not_hit(work: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version_does_not_hit(work: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
     planned()
     before = dict(work)
-    monkeypatch.setattr("planner.cache._code_digest", lambda: b"another version")
+    monkeypatch.setattr("planner.cache.PLANS_VERSION", PLANS_VERSION + 1)
     planned()
     assert work["states"] == 2 * before["states"]
 

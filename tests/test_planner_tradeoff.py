@@ -2,16 +2,18 @@
 
 import itertools
 import json
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from chainsim import Outcome, Setting, Stats, balance_near, load_device, solve
+from chainsim import RUNGS, Chain, Outcome, Rung, Setting, Stats, balance_near, load_device, solve
 from encoders import Frame, GridShape, Scene, TextOptions, TextSource, encode_text, levels
 from planner import FramePlan, PointTone, plan_scene
-from planner.analysis.climbing import climb
+from planner.analysis.climbing import _ladder, climb
 from planner.analysis.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
+from planner.analysis.requirement import Requirement, Term
 from planner.analysis.tradeoff import LONG_S, Tradeoff, TradeoffRow, by_clock, trade_off
 
 SHAPE = GridShape(6, 6)
@@ -176,6 +178,43 @@ def test_the_cheapest_to_a_tolerance(tol, rung, met):
     choice = MADE.cheapest(tol)
     assert (choice.row.rung, choice.met) == (rung, met)
     assert f"{choice.row.error:.1e}" in choice.sentence
+
+
+HARD = Chain(3, 0.05, -1.0)
+
+
+class Newcomer(Rung):
+    """A rung of another package: stands between others, and says all that is to be known of it."""
+
+    name, order, valid, models = "newcomer", "none", "never", frozenset({"nonlinearity"})
+
+    def refusal(self, chain, setting, start):
+        return ""
+
+    def steady(self, chain, setting, *, tol, start):
+        raise NotImplementedError
+
+
+def test_a_new_rung_is_an_entry(monkeypatch):
+    known = dict(RUNGS)
+    question = Question(HARD, Setting.of(HARD, epsilon=1e-3, lam=0.2, omega=1.1), np.ones((1, HARD.n), complex))
+    before = _ladder(question, 1e-3)
+    assert [rung for rung, _ in before] == ["linear", "one_harmonic", "harmonic_balance", "ode"]
+    try:
+        RUNGS.clear()
+        RUNGS.update({"static": known["static"], "linear": known["linear"], "newcomer": (__name__, "Newcomer")} | known)
+        monkeypatch.setitem(sys.modules, __name__, sys.modules[__name__])
+        assert _ladder(question, 1e-3) == [before[0], ("newcomer", 1.0), *before[1:]]
+        still = Question(HARD, Setting.of(HARD, epsilon=0, lam=0.2, omega=1.1), np.ones((1, HARD.n), complex))
+        assert refusal("newcomer", still) == "nothing vibrates; static is exact"
+        terms = tuple(Term(name, 0.0, name == "nonlinearity", "", 0) for name in ("nonlinearity", "preload"))
+        assert Requirement("made", 1e-2, terms, 0.0, True, 1, 1).rung == "newcomer"
+        needs_more = tuple(replace(term, included=True) for term in terms)
+        assert Requirement("made", 1e-2, needs_more, 0.0, True, 1, 1).rung == "harmonic_balance"
+        assert Requirement("made", 1e-2, terms, 0.0, False, 1, 1).rung == "static"
+    finally:
+        RUNGS.clear()
+        RUNGS.update(known)
 
 
 def test_climbing_stops_at_the_first_that_will_do():

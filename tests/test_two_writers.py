@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from drivers.files.parts import part_of
 
 from drivers import atomic_files, settled
+from drivers.files.parts import part_of
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks on folders")
 

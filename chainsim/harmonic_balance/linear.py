@@ -13,7 +13,7 @@ from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..floquet.monodromy import rest_multipliers
 from ..model.response import Outcome, Response, Stats
-from ..rung import Rung, Start
+from ..rung import DEFLECTION, VIBRATION, Rung, Start
 from .answer import Answer, defect, outcomes, response_of
 from .joint import correct_joint, rounding_of
 from .long import is_long
@@ -32,6 +32,7 @@ class LinearRung(Rung):
     order = "O(beta a^2) over the distance to resonance"
     valid = "beta a^2 << max(delta, lam)"
     models = frozenset[str]()
+    answers = frozenset({DEFLECTION, VIBRATION})
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """It answers every chain."""

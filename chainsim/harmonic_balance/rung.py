@@ -39,6 +39,7 @@ class HarmonicBalanceRung(Rung):
     valid = "any response locked to the drive"
     models = TERMS
     lists_branches = True
+    adjustable = True
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""

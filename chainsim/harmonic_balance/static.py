@@ -10,7 +10,7 @@ from ..equations.basis import basis_for
 from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome, Response, Stats
-from ..rung import TERMS, Rung, Start
+from ..rung import DEFLECTION, TERMS, Rung, Start
 from .answer import Answer, defect, outcomes, response_of
 from .branches import all_branches
 from .rung import branch_refusal, lower_branch
@@ -30,6 +30,7 @@ class StaticRung(Rung):
     valid = "bias and preload only"
     models = TERMS
     lists_branches = True
+    answers = frozenset({DEFLECTION})
 
     def refusal(self, chain: Chain, setting: Setting, start: Start) -> str:
         """Every branch only of one setting, and only where oscillators can be solved in turn."""

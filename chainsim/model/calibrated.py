@@ -19,7 +19,7 @@ Place = Annotated[int, Field(ge=0, le=1023)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class PlusMinus(_Part):

@@ -30,7 +30,7 @@ Bits = Annotated[int, Field(ge=1, le=32)]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class Span(_Part):
@@ -287,9 +287,8 @@ def device_names() -> list[str]:
     return sorted(path.stem for path in PROFILES.glob("*.yaml"))
 
 
-@cache
 def load_device(name: str) -> Device:
-    """A built-in profile by name, or the profile in the YAML file of that path.
+    """A built-in profile by name, or the profile in the YAML file of that path, as the file is now.
 
     Raises
     ------
@@ -297,7 +296,7 @@ def load_device(name: str) -> Device:
         When there is no such profile or file, or the file does not fit; the message says where.
     """
     if name in device_names():
-        return read_model(PROFILES / f"{name}.yaml", Device)
+        return _built_in(name)
     path = Path(name)
     if path.suffix.lower() in {".yaml", ".yml"}:
         return read_model(path, Device)
@@ -305,3 +304,8 @@ def load_device(name: str) -> Device:
     meant = f"; did you mean {close[0]}?" if close else ""
     known = ", ".join(device_names())
     raise ProfileError(f"device {name!r}: not a built-in profile ({known}) and not a .yaml file{meant}")
+
+
+@cache
+def _built_in(name: str) -> Device:
+    return read_model(PROFILES / f"{name}.yaml", Device)

@@ -14,7 +14,7 @@ from ..equations.chain import Chain, Setting
 from ..equations.scaled_chain import ScaledChain
 from ..harmonic_balance.march import branches_of
 from ..model.response import Branch, Outcome, Response, Stats
-from ..rung import MAX_PERIODS, TERMS, Rung, RungError, Start
+from ..rung import DEFLECTION, MAX_PERIODS, TERMS, VIBRATION, Rung, RungError, Start
 from .ramp import settle_ramp
 from .shooting import FAR_SMALLER, Orbits, shoot
 from .transient import Settled, settle
@@ -215,6 +215,9 @@ class OdeRung(Rung):
     order: ClassVar[str] = "tol (steps are doubled until the answer moves by less)"
     valid: ClassVar[str] = "always; a slow settling may exceed the budget of periods"
     models = TERMS
+    answers = frozenset({DEFLECTION, VIBRATION})
+    adjustable = True
+    full_equations = True
 
     max_periods: ClassVar[int] = MAX_PERIODS
 

@@ -11,34 +11,39 @@ import json
 import os
 import signal
 import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
+from typer.main import get_command_name
 
 from ..errors import Terminated
 from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
-from .completion import completed_devices, completed_files
+from .completion import completed_devices, completed_files, completed_texts
 from .ending import ended
 from .help import LOOK, RENDER, SET_UP, STUDY, Commands
 from .options import Dots, Presentation, SampleFormat, Undefined
-from .pictures import picture_app
-from .plan import plan_app
-from .play import play_app
-from .study import study_app
 
-__all__ = ["app", "main"]
+__all__ = ["app", "application", "main"]
 
-app = typer.Typer(
-    name="dotwave",
-    help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
-    no_args_is_help=True,
-    cls=Commands,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+
+def _without_commands() -> typer.Typer:
+    return typer.Typer(
+        name="dotwave",
+        help="Braille, textures and icons as amplifier waveforms for grids of coupled piezoelectric actuators.",
+        no_args_is_help=True,
+        cls=Commands,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+
+
+app = _without_commands()
 
 GAP = "in actuators."
 
@@ -50,7 +55,7 @@ def text(
         typer.Argument(
             metavar="TEXT|FILE|-",
             help="A file if it exists, - for stdin, else words.",
-            autocompletion=completed_files(".txt", ".brf", ".brl"),
+            autocompletion=completed_texts(),
         ),
     ],
     device: Device = "paper-6x6",
@@ -234,10 +239,25 @@ def doctor(as_json: Json = False) -> None:
     _finish(report, as_json, ok=report.ok)
 
 
-app.add_typer(picture_app)
-app.add_typer(study_app)
-app.add_typer(plan_app)
-app.add_typer(play_app)
+@cache
+def application() -> typer.Typer:
+    """All commands."""
+    for name in ("pictures", "study", "plan", "play"):
+        app.add_typer(import_module(f".{name}", __package__).commands)
+    return app
+
+
+def _asked(words: Sequence[str]) -> typer.Typer:
+    """No other command than the first of `words`, where that is one: making all takes longer than most take to run."""
+    for parts in (lambda: [app], lambda: [group.typer_instance for group in application().registered_groups]):
+        for info in (info for part in parts() if part is not None for info in part.registered_commands):
+            if words[:1] == [info.name or get_command_name(getattr(info.callback, "__name__", ""))]:
+                only = _without_commands()
+                only.registered_commands.append(info)
+                # Without a function of its own it would be the command itself, not a group of one.
+                only.callback()(lambda: None)
+                return only
+    return application()
 
 
 def _terminate(number: int, _frame: object) -> NoReturn:
@@ -277,4 +297,4 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             # A terminal that cannot show Braille gets escapes, not a traceback.
             stream.reconfigure(errors="backslashreplace")
-    sys.exit(ended(lambda: app(prog_name="dotwave")))
+    sys.exit(ended(lambda: _asked(sys.argv[1:])(prog_name="dotwave")))

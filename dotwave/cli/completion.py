@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
-__all__ = ["completed_devices", "completed_files"]
+__all__ = ["completed_devices", "completed_files", "completed_texts"]
 
 Completer = Callable[[str], list[str]]
 
@@ -45,3 +45,14 @@ def completed_devices(incomplete: str) -> list[str]:
     folders = spec.submodule_search_locations if spec is not None else None
     names = sorted(path.stem for folder in folders or () for path in Path(folder, "model", "profiles").glob("*.yaml"))
     return [name for name in names if name.startswith(incomplete)] or completed_files(".yaml", ".yml")(incomplete)
+
+
+def completed_texts(*others: str) -> Completer:
+    """As `completed_files`, of the text formats there are, and of these other suffixes."""
+
+    def complete(incomplete: str) -> list[str]:
+        from encoders import text_suffixes
+
+        return completed_files(*text_suffixes(), *others)(incomplete)
+
+    return complete

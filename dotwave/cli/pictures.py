@@ -8,14 +8,22 @@ from typing import Annotated
 
 import typer
 
+from encoders import picture_rules
+
 from .command import Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
 from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
 
-__all__ = ["picture_app"]
+__all__ = ["commands"]
 
-picture_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
+
+
+def _words(option: str) -> str:
+    """The choices of an option of `encoders.PictureOptions`."""
+    return ", ".join(picture_rules()[option].choices)
+
 
 PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
 ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
@@ -24,7 +32,7 @@ Contrast = Annotated[
 ]
 
 
-@picture_app.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
+@commands.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
 def image(
     files: Annotated[
         list[Path],
@@ -37,13 +45,15 @@ def image(
     device: Device = "paper-6x6",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
     explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
-    style: Annotated[str | None, typer.Option(help="Defaults for: auto, icon, photo.")] = None,
-    fit: Annotated[str | None, typer.Option(help="contain, cover or stretch.")] = None,
-    kind: Annotated[str | None, typer.Option("--as", help="What a dot can be: on_off, levels, texture.")] = None,
-    threshold: Annotated[str | None, typer.Option(help="otsu, adaptive or fixed.")] = None,
-    invert: Annotated[str | None, typer.Option(help="Raise what is dark: auto, yes, no.")] = None,
+    style: Annotated[str | None, typer.Option(help=f"Defaults for: {_words('style')}.")] = None,
+    fit: Annotated[str | None, typer.Option(help=f"How it meets the grid: {_words('fit')}.")] = None,
+    kind: Annotated[str | None, typer.Option("--as", help=f"What a dot can be: {_words('output')}.")] = None,
+    threshold: Annotated[
+        str | None, typer.Option(help=f"How figure and ground are parted: {_words('threshold')}.")
+    ] = None,
+    invert: Annotated[str | None, typer.Option(help=f"Raise what is dark: {_words('invert')}.")] = None,
     edges: Annotated[bool, typer.Option("--edges", help="Outlines in place of areas.")] = False,
-    zoom: Annotated[int, typer.Option(help="2 to 16: an overview, then parts of the picture.")] = 1,
+    zoom: Annotated[int, typer.Option(help="From 2 on: an overview, then parts of the picture.")] = 1,
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
     contrast: Contrast = 20.0,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
@@ -73,7 +83,7 @@ def image(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
+@commands.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
 def icons(
     sources: Annotated[
         list[str],
@@ -123,7 +133,7 @@ def icons(
     finish(report, as_json, ok=report.ok)
 
 
-@picture_app.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
+@commands.command(short_help="Carry out a job file.", rich_help_panel=RENDER)
 def render(
     job: Annotated[
         Path,
@@ -164,7 +174,7 @@ def render(
     finish(told, as_json, ok=told.ok)
 
 
-@picture_app.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
+@commands.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them.
 

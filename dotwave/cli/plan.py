@@ -8,19 +8,19 @@ from typing import Annotated
 import typer
 
 from .command import Json, finish
-from .completion import completed_devices, completed_files
+from .completion import completed_devices, completed_texts
 from .help import STUDY
 
-__all__ = ["plan_app"]
+__all__ = ["commands"]
 
-plan_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
 
 Source = Annotated[
     str,
     typer.Argument(
         metavar="JOB.yaml|TEXT|FILE|-",
         help="A job file, or a text as `dotwave text`.",
-        autocompletion=completed_files(".yaml", ".yml", ".txt", ".brf", ".brl"),
+        autocompletion=completed_texts(".yaml", ".yml"),
     ),
 ]
 Profile = Annotated[
@@ -35,7 +35,7 @@ Profile = Annotated[
 Picture = Annotated[Path | None, typer.Option("--picture", help="Also a picture, .png or .svg.")]
 
 
-@plan_app.command(short_help="Say which terms of the model a scene needs, and why.", rich_help_panel=STUDY)
+@commands.command(short_help="Say which terms of the model a scene needs, and why.", rich_help_panel=STUDY)
 def explain(
     source: Source,
     device: Profile = None,
@@ -55,7 +55,7 @@ def explain(
     finish(run(source, device=device, tol=tol), as_json, ok=True)
 
 
-@plan_app.command(short_help="Measure speed against accuracy on a scene.", rich_help_panel=STUDY)
+@commands.command(short_help="Measure speed against accuracy on a scene.", rich_help_panel=STUDY)
 def tradeoff(
     source: Source,
     device: Profile = None,
@@ -80,7 +80,7 @@ def tradeoff(
     finish(report, as_json, ok=report.ok)
 
 
-@plan_app.command(short_help="Trade error, time, drive and robustness of one frame.", rich_help_panel=STUDY)
+@commands.command(short_help="Trade error, time, drive and robustness of one frame.", rich_help_panel=STUDY)
 def pareto(
     source: Source,
     device: Annotated[

@@ -11,9 +11,9 @@ import typer
 from .command import Device, Json, Written, finish
 from .help import PLAY
 
-__all__ = ["play_app"]
+__all__ = ["commands"]
 
-play_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
 
 
 class BoardModel(StrEnum):
@@ -29,17 +29,20 @@ class BoardFirmware(StrEnum):
     CORRECTED = "corrected"
 
 
-@play_app.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
+@commands.command(short_help="Play a written waveform on hardware.", rich_help_panel=PLAY)
 def play(
     out: Written,
     port: Annotated[str | None, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")] = None,
     live: Annotated[bool, typer.Option("--live", help="Really play; without it only the checks are made.")] = False,
     baud: Annotated[int | None, typer.Option(min=300, help="Bits per second; default: the controller's own.")] = None,
-    patience: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a controller not heard.")] = 10.0,
+    patience: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds to wait for a controller not heard; default: 10.")
+    ] = None,
     board: Annotated[BoardModel | None, typer.Option(help="A board that plays by itself, instead.")] = None,
-    firmware: Annotated[BoardFirmware, typer.Option(help="What runs on the board.")] = BoardFirmware.TEST_PIXEL,
+    firmware: Annotated[BoardFirmware | None, typer.Option(help="What runs on the board; default: test-pixel.")] = None,
     audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
-    channels: Annotated[str, typer.Option("--map", help="Sound card outputs: channel:output,...")] = "",
+    channels: Annotated[str | None, typer.Option("--map", help="Sound card outputs: channel:output,...")] = None,
+    to: Annotated[str | None, typer.Option(metavar="NAME:PLACE", help="Any sink, also one of another package.")] = None,
     as_json: Json = False,
 ) -> None:
     """Check a written waveform against the safety gate and, with --live, play it.
@@ -56,13 +59,13 @@ def play(
     from ..playing.play import play as run
 
     report = run(
-        Path(out), live=live, port=port, baud=baud, patience_s=patience, board=board is not None,
-        firmware=Firmware(firmware.value), audio=audio, mapping=channels,
+        Path(out), live=live, port=port, board=board is not None, audio=audio, to=to, baud=baud, patience_s=patience,
+        firmware=None if firmware is None else Firmware(firmware.value), mapping=channels,
     )  # fmt: skip
     finish(report, as_json, ok=report.ok)
 
 
-@play_app.command(short_help="List serial ports.", rich_help_panel=PLAY)
+@commands.command(short_help="List serial ports.", rich_help_panel=PLAY)
 def ports(as_json: Json = False) -> None:
     """List the serial ports of this machine.
 
@@ -75,7 +78,7 @@ def ports(as_json: Json = False) -> None:
     finish(list_ports(), as_json, ok=True)
 
 
-@play_app.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
+@commands.command(short_help="Stand in for a controller.", rich_help_panel=PLAY)
 def emulate(
     device: Device = "paper-6x6",
     link: Annotated[Path | None, typer.Option(help="A stable name for the port (a symbolic link).")] = None,

@@ -11,12 +11,12 @@ from .command import Device, Json, finish
 from .completion import completed_files
 from .help import STUDY
 
-__all__ = ["study_app"]
+__all__ = ["commands"]
 
-study_app = typer.Typer(rich_markup_mode=None)
+commands = typer.Typer(rich_markup_mode=None)
 
 
-@study_app.command(short_help="Solve one chain at many settings.", rich_help_panel=STUDY)
+@commands.command(short_help="Solve one chain at many settings.", rich_help_panel=STUDY)
 def sweep(
     chain: Annotated[
         Path,
@@ -51,7 +51,7 @@ def sweep(
     finish(report, as_json, ok=True)
 
 
-@study_app.command(short_help="Measure the solvers against others, on this machine.", rich_help_panel=STUDY)
+@commands.command(short_help="Measure the solvers against others, on this machine.", rich_help_panel=STUDY)
 def bench(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for bench.json and bench.svg.")] = Path(
         "out/bench"
@@ -72,7 +72,7 @@ def bench(
     finish(run_bench(output, quick=quick), as_json, ok=True)
 
 
-@study_app.command(short_help="Fit the actuators of a device to measured frequency sweeps.", rich_help_panel=STUDY)
+@commands.command(short_help="Fit the actuators of a device to measured frequency sweeps.", rich_help_panel=STUDY)
 def calibrate(
     sweep: Annotated[
         str,

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chainsim import RUNGS
 from drivers import atomic_file, naming
 
 from ..plain import one_line
@@ -15,19 +16,10 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_pareto", "draw_tradeoff"]
 
-COLOURS = {
-    "static": "#7a5195", "linear": "#d1495b", "one_harmonic": "#edae49", "harmonic_balance": "#00798c",
-    "envelope": "#66a182", "ode": "#2e4057", "auto": "#8d99ae",
-}  # fmt: skip
-MARKS = {
-    "static": "P",
-    "linear": "s",
-    "one_harmonic": "^",
-    "harmonic_balance": "D",
-    "envelope": "v",
-    "ode": "o",
-    "auto": "x",
-}
+# Of rungs, in the order of `chainsim.RUNGS`; a colour and a mark for those to come.
+COLOURS = ("#7a5195", "#d1495b", "#edae49", "#00798c", "#66a182", "#2e4057")
+MARKS = "Ps^Dvo"
+AUTO, ANOTHER = ("#8d99ae", "x"), ("black", "*")
 # Errors below this are rounding.
 ROUNDING = 1e-16
 SHAPES = "so^DvP"
@@ -37,12 +29,14 @@ def draw_tradeoff(found: Tradeoff, picture: Path, *, tol: float | None, budget_s
     """True error (filled) and the rung's own estimate (outlined) against time; the line joins what none beats."""
     figure, axes = _axes((7.4, 4.2))
     axes.set(xscale="log", yscale="log")
+    looks = {**dict(zip(RUNGS, zip(COLOURS, MARKS, strict=True), strict=False)), "auto": AUTO}
     for rung in dict.fromkeys(row.rung for row in found.rows):
         rows = [row for row in found.rows if row.rung == rung]
         seconds = [row.seconds for row in rows]
         errors = [max(row.error, ROUNDING) for row in rows]
         estimates = [max(row.estimate, ROUNDING) for row in rows]
-        style = {"marker": MARKS.get(rung, "o"), "linestyle": "none", "color": COLOURS.get(rung, "black")}
+        colour, mark = looks.get(rung, ANOTHER)
+        style = {"marker": mark, "linestyle": "none", "color": colour}
         lost = " (not all chains)" if min(row.solved for row in rows) < 1 else ""
         axes.plot(seconds, errors, label=rung.replace("_", " ") + lost, markersize=7, zorder=3, **style)
         if rung != "auto":

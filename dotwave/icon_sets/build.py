@@ -20,7 +20,7 @@ from .pool import ClusterPool, LocalPool, Pool
 from .report import IconsReport
 from .run import CANDIDATES, IconOptions, IconRun
 from .sources import find_icons
-from .work import Recipe, code_digest
+from .work import Recipe, versions
 from .written import write_report
 
 __all__ = ["IconOptions", "render_icons"]
@@ -61,7 +61,7 @@ def render_icons(
         dwell_s=options.dwell_s,
         candidates=CANDIDATES if options.distinct else 1,
     )
-    recipe = Recipe(device, picture, options.contrast_db, options.encoding, code_digest())
+    recipe = Recipe(device, picture, options.contrast_db, options.encoding, versions())
     places = find_icons(sources)
     if options.waveforms:
         blank = Frame(TargetPattern(np.zeros((device.rows, device.cols), np.complex128)), options.dwell_s)

@@ -20,11 +20,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
-from drivers import DriverError, Encoding, write_waveform
-from encoders import EncodeError, Frame, GridShape, PictureOptions, Scene, TargetPattern, encode_picture
-from planner import Plan, PlanError, plan_scene
+from drivers import WAVEFORMS_VERSION, DriverError, Encoding, write_waveform
+from encoders import (
+    PICTURES_VERSION,
+    EncodeError,
+    Frame,
+    GridShape,
+    PictureOptions,
+    Scene,
+    TargetPattern,
+    encode_picture,
+)
+from planner import PLANS_VERSION, Plan, PlanError, plan_scene
 
-__all__ = ["Recipe", "Record", "Task", "all_of_batch", "code_digest", "encode_icons", "plan_patterns", "write_waves"]
+__all__ = [
+    "Recipe",
+    "Record",
+    "Task",
+    "all_of_batch",
+    "code_digest",
+    "encode_icons",
+    "plan_patterns",
+    "versions",
+    "write_waves",
+]
 
 Floats = NDArray[np.float64]
 Record = dict[str, Any]
@@ -34,9 +53,14 @@ PACKAGES = ("chainsim", "drivers", "encoders", "planner")
 DIGITS = 6
 
 
+def versions() -> str:
+    """What the numbers of an icon hang on beside its recipe: what was made with others is not used."""
+    return f"plans {PLANS_VERSION}, pictures {PICTURES_VERSION}, waveforms {WAVEFORMS_VERSION}"
+
+
 @cache
 def code_digest() -> str:
-    """Digest of the code that does the work: what another version made is not used."""
+    """Digest of the code that does the work: machines that share it must have the same."""
     digest = hashlib.sha256()
     here = Path(__file__)
     for path in (here, *(path for one in PACKAGES for path in sorted((here.parents[2] / one).rglob("*.py")))):
@@ -51,14 +75,14 @@ class Recipe:
     Attributes
     ----------
     device : the hardware. options : of the encoder, with the number of candidates. contrast_db : of the planner.
-    encoding : of the samples. code : `code_digest` of the version that is asked.
+    encoding : of the samples. made_by : `versions` of the one who asks.
     """
 
     device: Device
     options: PictureOptions
     contrast_db: float
     encoding: Encoding
-    code: str
+    made_by: str
 
     @property
     def shape(self) -> GridShape:
@@ -68,7 +92,7 @@ class Recipe:
     @cached_property
     def scope(self) -> str:
         """Digest of all of it."""
-        given = [self.device.as_dict(), asdict(self.options), self.contrast_db, self.encoding, self.code]
+        given = [self.device.as_dict(), asdict(self.options), self.contrast_db, self.encoding, self.made_by]
         return hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()[:24]
 
     def key(self, kind: str, item: bytes) -> str:

@@ -5,9 +5,17 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from chainsim import (
     Amplifier,
@@ -21,11 +29,11 @@ from chainsim import (
     shown,
     words_of,
 )
-from encoders import Fit, Invert, Output, PictureOptions, Presentation, RegionsBy, Style, Threshold, Undefined
+from encoders import PictureOptions, Presentation, Style, Undefined, picture_rules
 
 from ..request import TOLERANCES
 from .paths import FilePath
-from .texture import NotNegative, Part, Positive, Seconds, TexturePart
+from .texture import Part, Positive, Seconds, TexturePart
 
 __all__ = [
     "SCHEMA",
@@ -167,41 +175,39 @@ class TextPart(Part):
         return self
 
 
-class PicturePart(Part):
+class _PictureFile(Part):
     """A picture; the options are those of `encoders.PictureOptions`."""
 
     file: FilePath
     style: Style = Style.AUTO
     background: Colour = "auto"
-    crop: bool | None = None
-    fit: Fit | None = None
-    contrast: bool | None = None
-    edges: bool = False
-    threshold: Threshold | None = None
-    threshold_value: Annotated[float, Field(ge=0, le=1)] = 0.2
-    invert: Invert = Invert.AUTO
-    thicken: Annotated[float, Field(ge=0, le=4)] = 0.0
-    gap_m: NotNegative = 6.4e-3
-    stroke_m: NotNegative | None = None
-    output: Output = Output.ON_OFF
-    levels: Annotated[int, Field(ge=1, le=8)] = 3
-    level_step_db: Annotated[float, Field(ge=3, le=40)] = 6.0
-    regions: Annotated[int, Field(ge=1, le=5)] = 3
-    regions_by: RegionsBy = RegionsBy.COLOUR
-    zoom: Annotated[int, Field(ge=1, le=16)] = 1
-    overlap: Annotated[float, Field(ge=0, le=0.9)] = 0.25
-    dwell_s: Seconds = 1.0
 
     short: ClassVar[str] = "file"
 
     @model_validator(mode="after")
-    def _fits(self) -> PicturePart:
+    def _fits(self) -> Self:
         self.options(8e-3)
         return self
 
     def options(self, pitch_m: float) -> PictureOptions:
         """The encoder's options for a grid with that pitch."""
         return PictureOptions(**self.model_dump(exclude={"file"}), pitch_m=(pitch_m, pitch_m))
+
+
+def _picture_keys() -> dict[str, Any]:
+    """The options of the encoder as keys; the pitch is the device's, and candidates are for sets of icons."""
+    keys = {}
+    for name, rule in picture_rules().items():
+        if name not in {*_PictureFile.model_fields, "pitch_m", "candidates"}:
+            span = Field() if rule.span is None else Field(ge=rule.span.low, le=rule.span.high)
+            keys[name] = Annotated[rule.type, span], rule.default
+    return keys
+
+
+if TYPE_CHECKING:
+    PicturePart: TypeAlias = _PictureFile
+else:
+    PicturePart = create_model("PicturePart", __base__=_PictureFile, __doc__=_PictureFile.__doc__, **_picture_keys())
 
 
 class Item(Part):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +12,7 @@ import numpy as np
 
 from chainsim import load_device
 from drivers import atomic_file, naming
-from encoders import (
-    Fit,
-    GridShape,
-    Invert,
-    Output,
-    PictureOptions,
-    Style,
-    Threshold,
-    encode_picture,
-    explain_picture,
-)  # fmt: skip
+from encoders import GridShape, PictureOptions, encode_picture, explain_picture, picture_rules
 
 from ..errors import AppError
 from ..jobs.scene import Shown, joined, picture_words
@@ -33,14 +22,6 @@ from .scene import Rendering, render_scene
 __all__ = ["picture_options", "render_images"]
 
 SHORTEST_SIDE = 240
-
-_CHOICES: dict[str, type[StrEnum]] = {
-    "style": Style,
-    "fit": Fit,
-    "output": Output,
-    "threshold": Threshold,
-    "invert": Invert,
-}
 
 
 def picture_options(**given: Any) -> PictureOptions:
@@ -52,12 +33,11 @@ def picture_options(**given: Any) -> PictureOptions:
         When a word is not one of its choices, or a number is out of range.
     """
     chosen = {name: value for name, value in given.items() if value is not None}
-    for name, kind in _CHOICES.items():
-        if name in chosen and chosen[name] not in list(kind):
+    for name, value in chosen.items():
+        words = picture_rules()[name].choices
+        if words and value not in words:
             option = "as" if name == "output" else name
-            raise AppError(f"--{option}: expected one of {', '.join(kind)}, got {chosen[name]!r}")
-        if name in chosen:
-            chosen[name] = kind(chosen[name])
+            raise AppError(f"--{option}: expected one of {', '.join(words)}, got {value!r}")
     return PictureOptions(**chosen)
 
 

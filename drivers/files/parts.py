@@ -144,7 +144,7 @@ def _left_in(folder: Path) -> dict[str, list[Part]]:
     found: dict[str, list[Part]] = {}
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            part = part_of(folder / entry.name)
+            part = part_of(folder / entry.name) if PATTERN.fullmatch(entry.name) else None
             if part is None:
                 continue
             with suppress(OSError):

@@ -12,7 +12,6 @@ import numpy as np
 from ..channels import Role
 from ..errors import DriverError
 from ..formats.samples import SampleReader
-from ..safety import Gate, GateLimits
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
 from .messages import FULL_CODE, VERSION, Capabilities, LinkCoupling, Mark, Samples, Start
@@ -85,30 +84,27 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
 
 
 def session_messages(
-    manifest: Manifest, reader: SampleReader, found: Capabilities, *, session: int, limits: GateLimits
+    manifest: Manifest, reader: SampleReader, found: Capabilities, *, session: int
 ) -> Iterator[Message]:
     """START, then samples with the events before the samples they belong to, then END.
 
     A sample becomes one of 65535 codes: a constant voltage the nearest, a drive one within two steps, so that the
     error lies high above the resonances (`Shaper`). Links become the nearest multiple of lam_step; times of events
-    the nearest sample. Every block passes the safety gate again before it is sent.
+    the nearest sample.
 
     Raises
     ------
     UnfitController
         Before anything, when the waveform does not fit the controller.
-    GateRefusal, FileError, UnreadableWaveform
-        In mid-stream, when the file is no longer what it was.
+    FileError, UnreadableWaveform
+        In mid-stream, when the file is no longer what it was; what else the samples themselves raise while read.
     """
     check_fit(manifest, found)
-    return _messages(manifest, reader, found, session, limits)
+    return _messages(manifest, reader, found, session)
 
 
-def _messages(
-    manifest: Manifest, reader: SampleReader, found: Capabilities, session: int, limits: GateLimits
-) -> Iterator[Message]:
+def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
     yield Start(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
-    gate = Gate(limits, manifest.channels, manifest.rate_hz)
     waiting = merge(_links(manifest, found), _marks(manifest, found), key=lambda event: event.at)
     event = next(waiting, None)
     most = Samples.most(found.channels, found.max_payload)
@@ -116,7 +112,6 @@ def _messages(
     drives = [channel.index for channel in manifest.channels if channel.role is Role.DRIVE]
     shaper, first = Shaper(len(drives)), 0
     for volts in reader.blocks(block):
-        gate.check(volts)
         while event is not None and event.at < first + len(volts):
             yield event
             event = next(waiting, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from ..errors import DriverError
 from ..formats.samples import SampleReader
 from ..waveform.manifest import Manifest
+from .base import SinkReport
 
-__all__ = ["AudioError", "AudioUnavailable", "parse_outputs", "play_audio"]
+__all__ = ["AudioError", "AudioUnavailable", "SoundCard", "parse_outputs", "play_audio"]
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +32,36 @@ class AudioError(DriverError, OSError):
 
     Examples: no such device; fewer outputs than channels; a rate it does not know.
     """
+
+
+@dataclass(frozen=True)
+class SoundCard:
+    """A sink: the sound card called `card`.
+
+    Attributes
+    ----------
+    card : name or number for PortAudio, '' for its default. mapping : ``channel:output,...``, as `parse_outputs`.
+    """
+
+    card: str
+    mapping: str = ""
+
+    def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
+        """Whether the mapping fits the channels; raises AudioError."""
+        parse_outputs(self.mapping, len(manifest.channels))
+        return SinkReport(
+            notes=("A sound card carries no coupling: links stay as they are.",) * bool(manifest.coupling)
+        )
+
+    def play(self, manifest: Manifest, samples: SampleReader, progress: Callable[[float], None]) -> SinkReport:
+        """As `play_audio`."""
+        device: str | int | None = int(self.card) if self.card.isdecimal() else (self.card or None)
+        outputs = parse_outputs(self.mapping, len(manifest.channels))
+        play_audio(manifest, samples, device=device, outputs=outputs, progress=progress)
+        return self.check(manifest, samples)
+
+    def close(self) -> None:
+        """Nothing stays open after `play`."""
 
 
 def parse_outputs(text: str, channels: int) -> tuple[int, ...]:

@@ -19,10 +19,12 @@ from ..formats.samples import SUFFIXES, SampleReader, check_suffix, open_samples
 from ..formats.wav import Encoding
 from .limits import LimitCheck
 from .manifest import Manifest, ManifestWriter, digest_of_open
-from .manifest_reader import read_manifest
 from .sampling import Waveform
 
-__all__ = ["WrittenWaveform", "read_waveform", "write_waveform"]
+__all__ = ["WAVEFORMS_VERSION", "WrittenWaveform", "read_waveform", "write_waveform"]
+
+WAVEFORMS_VERSION = 1
+"""One more whenever a plan gives other samples or another manifest: waveforms of icons are then written anew."""
 
 BLOCK = 4096
 
@@ -123,6 +125,9 @@ def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     UnreadableWaveform
         When one of them is not what it should be, or they do not belong together.
     """
+    # Imported here: whoever only writes has no manifest to check.
+    from .manifest_reader import read_manifest
+
     path = Path(path)
     manifest_path = path if path.suffix.lower() == ".json" else path.with_suffix(".json")
     settled(manifest_path, _belongs(path))

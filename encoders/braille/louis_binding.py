@@ -17,7 +17,6 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import LouisMissing
-from .louis_cure import install_words
 
 __all__ = [
     "back_translate",
@@ -57,7 +56,7 @@ _kept: list[Any] = []  # the C library holds a pointer to the callback: it must 
 def _louis() -> ModuleType:
     module = _imported() or _from_distribution()
     if module is None:
-        raise LouisMissing(f"the Braille library liblouis (python3-louis) was not found; {install_words()}")
+        raise LouisMissing(f"the Braille library liblouis (python3-louis) was not found; {_cure()}")
 
     def note(level: int, message: bytes) -> None:
         if level >= _LOG_ERROR:
@@ -68,6 +67,13 @@ def _louis() -> ModuleType:
     module.setLogLevel(_LOG_WARN)
     _declare(module.liblouis)
     return module
+
+
+def _cure() -> str:
+    # Imported here: only a machine without the library needs it.
+    from .louis_cure import install_words
+
+    return install_words()
 
 
 def _imported() -> ModuleType | None:
@@ -90,7 +96,7 @@ def _from_distribution() -> ModuleType | None:
             try:
                 spec.loader.exec_module(module)
             except (ImportError, OSError) as error:
-                raise LouisMissing(f"{path} cannot be loaded ({error}); {install_words()}") from None
+                raise LouisMissing(f"{path} cannot be loaded ({error}); {_cure()}") from None
             return module
     return None
 

@@ -166,8 +166,8 @@ def _complaint(wish: str, tables: tuple[str, ...]) -> str:
 
 @cache
 def _folders() -> tuple[Path, ...]:
-    folders = {Path(path).parent for path in louis_binding.listed_tables()}
-    return tuple(sorted(folder for folder in folders if folder.is_dir()))
+    folders = {os.path.dirname(path) for path in louis_binding.listed_tables()}
+    return tuple(sorted(Path(folder) for folder in folders if os.path.isdir(folder)))
 
 
 def foreign_tables(spec: str) -> tuple[str, ...]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
+from functools import cache
+from typing import Annotated, Any, get_args, get_type_hints
 
 from .errors import PictureError
 
-__all__ = ["Fit", "Invert", "Output", "PictureOptions", "RegionsBy", "Style", "Threshold"]
+__all__ = [
+    "Fit", "Invert", "Output", "PictureOptions", "PictureRule", "RegionsBy", "Style", "Threshold", "picture_rules",
+]  # fmt: skip
 
 
 # Thinner lines beside solid parts would be lost between the dots of an 8 mm grid.
@@ -63,6 +67,35 @@ class RegionsBy(StrEnum):
 
 
 @dataclass(frozen=True)
+class Between:
+    """A number from `low` to `high`, both of them included."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class PictureRule:
+    """What an option may be, for whoever reads one from a person: a command line, a job file.
+
+    Attributes
+    ----------
+    type : of the value, None included where it stands for the default of the style. default : where nothing is said.
+    span : the numbers it may be, None where it is none. kind : the words it may be, None where it is none.
+    """
+
+    type: Any
+    default: Any
+    span: Between | None
+    kind: type[StrEnum] | None
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words it may be, in order; empty where it is none."""
+        return () if self.kind is None else tuple(self.kind)
+
+
+@dataclass(frozen=True)
 class PictureOptions:
     """Options of `encode_picture`; None stands for the default of the style.
 
@@ -81,6 +114,8 @@ class PictureOptions:
     dwell_s : seconds a frame is shown when the file does not say.
     candidates : how many good patterns of each frame the report lists (on/off only).
 
+    A choice may be given as its word.
+
     Raises
     ------
     PictureError
@@ -94,44 +129,34 @@ class PictureOptions:
     contrast: bool | None = None
     edges: bool = False
     threshold: Threshold | None = None
-    threshold_value: float = 0.2
+    threshold_value: Annotated[float, Between(0.0, 1.0)] = 0.2
     invert: Invert = Invert.AUTO
-    thicken: float = 0.0
-    gap_m: float = 6.4e-3
-    stroke_m: float | None = None
-    pitch_m: tuple[float, float] = (8.3e-3, 8.3e-3)
+    thicken: Annotated[float, Between(0.0, 4.0)] = 0.0
+    gap_m: Annotated[float, Between(0.0, 1.0)] = 6.4e-3
+    stroke_m: Annotated[float | None, Between(0.0, 1.0)] = None
+    pitch_m: Annotated[tuple[float, float], Between(1e-5, 1.0)] = (8.3e-3, 8.3e-3)
     output: Output = Output.ON_OFF
-    levels: int = 3
-    level_step_db: float = 6.0
-    regions: int = 3
+    levels: Annotated[int, Between(1, 8)] = 3
+    level_step_db: Annotated[float, Between(3.0, 40.0)] = 6.0
+    regions: Annotated[int, Between(1, 5)] = 3
     regions_by: RegionsBy = RegionsBy.COLOUR
-    zoom: int = 1
-    overlap: float = 0.25
-    dwell_s: float = 1.0
-    candidates: int = 1
+    zoom: Annotated[int, Between(1, 16)] = 1
+    overlap: Annotated[float, Between(0.0, 0.9)] = 0.25
+    dwell_s: Annotated[float, Between(1e-3, 3600.0)] = 1.0
+    candidates: Annotated[int, Between(1, 256)] = 1
 
     def __post_init__(self) -> None:
-        ranges: dict[str, tuple[float, float, float]] = {
-            "threshold_value": (self.threshold_value, 0.0, 1.0),
-            "thicken": (self.thicken, 0.0, 4.0),
-            "gap_m": (self.gap_m, 0.0, 1.0),
-            "stroke_m": (self.stroke_m or 0.0, 0.0, 1.0),
-            "pitch_m": (min(self.pitch_m), 1e-5, 1.0),
-            "levels": (self.levels, 1, 8),
-            "level_step_db": (self.level_step_db, 3.0, 40.0),
-            "regions": (self.regions, 1, 5),
-            "zoom": (self.zoom, 1, 16),
-            "overlap": (self.overlap, 0.0, 0.9),
-            "dwell_s": (self.dwell_s, 1e-3, 3600.0),
-            "candidates": (self.candidates, 1, 256),
-        }
-        for name, (value, low, high) in ranges.items():
-            if not (math.isfinite(value) and low <= value <= high):
-                raise PictureError(f"picture.{name}: expected a number from {low:g} to {high:g}, got {value}")
-        for name, kind in _CHOICES.items():
-            given = getattr(self, name)
-            if given is not None and given not in list(kind):
-                raise PictureError(f"picture.{name}: expected one of {', '.join(kind)}, got {given!r}")
+        for name, rule in picture_rules().items():
+            given, span = getattr(self, name), rule.span
+            if given is None:
+                continue
+            least = min(given) if isinstance(given, tuple) else given
+            if span is not None and not (math.isfinite(least) and span.low <= least <= span.high):
+                raise PictureError(f"picture.{name}: expected a number from {span.low:g} to {span.high:g}, got {least}")
+            if rule.kind is not None and given not in rule.choices:
+                raise PictureError(f"picture.{name}: expected one of {', '.join(rule.choices)}, got {given!r}")
+            if rule.kind is not None:
+                object.__setattr__(self, name, rule.kind(given))
 
     def resolved(self, style: Style) -> PictureOptions:
         """The same options with the defaults of `style` (icon or photo) in place of None."""
@@ -147,11 +172,15 @@ class PictureOptions:
         )
 
 
-_CHOICES: dict[str, type[StrEnum]] = {
-    "style": Style,
-    "fit": Fit,
-    "threshold": Threshold,
-    "invert": Invert,
-    "output": Output,
-    "regions_by": RegionsBy,
-}
+@cache
+def picture_rules() -> dict[str, PictureRule]:
+    """What each option of `PictureOptions` may be, by its name."""
+    hints = get_type_hints(PictureOptions, include_extras=True)
+    return {field.name: _rule(hints[field.name], field.default) for field in fields(PictureOptions)}
+
+
+def _rule(hint: Any, default: Any) -> PictureRule:
+    span = next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, Between)), None)
+    kind = get_args(hint)[0] if span is not None else hint
+    enums = [one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, StrEnum)]
+    return PictureRule(kind, default, span, enums[0] if enums else None)

@@ -27,9 +27,12 @@ from .views import views
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-__all__ = ["FrameReport", "PictureReport", "PictureScene", "encode_picture", "explain_picture"]
+__all__ = ["PICTURES_VERSION", "FrameReport", "PictureReport", "PictureScene", "encode_picture", "explain_picture"]
 
 Floats = NDArray[np.float64]
+
+PICTURES_VERSION = 1
+"""One more whenever a picture gives other patterns: what was kept of icons before is not used."""
 
 PIXELS_PER_ACTUATOR = 12
 FEWEST_PIXELS, MOST_PIXELS = 72, 1536

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Outcome, Setting, solve
+from chainsim import Closure, Outcome, Setting
 
 from ..closed_forms.links import stages
 from ..family import AmplitudeFamily
@@ -57,6 +57,9 @@ class Deflection(AmplitudeFamily):
 
     def states(self, targets: Floats) -> list[OperatingPoint]:
         """Static settings for `targets`, checked by the static solver."""
+        # Imported here: what was planned before comes from the cache, and needs no solver.
+        from chainsim import solve
+
         device = self.device
         biases = self._bias(targets * device.full_scale, np.zeros_like(targets))
         step = device.amplifier.volt_step * device.bias_per_volt

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from chainsim import Response
+from chainsim import RUNGS, Response, load_rung
 
 from .questions import FINEST, TOLS, Question, TradeoffError, answer, positive, refusal, seconds_words
 
@@ -62,7 +62,7 @@ def climb(
 
 
 def _loading_s(rung: str) -> float:
-    return COLD_S if rung == "ode" and "numba" not in sys.modules else 0.0
+    return COLD_S if load_rung(rung).full_equations and "numba" not in sys.modules else 0.0
 
 
 def _estimate(found: Response) -> float:
@@ -72,8 +72,10 @@ def _estimate(found: Response) -> float:
 
 
 def _ladder(question: Question, tol: float | None) -> list[tuple[str, float]]:
-    """Rungs and tolerances by price; the full equations come last."""
-    steps = [(rung, 1.0) for rung in ("static", "linear", "one_harmonic")]
+    """Rungs and tolerances by price: what gives what it has, up to the first rung that gives what is asked for."""
+    rungs = [load_rung(name) for name in RUNGS]
+    first = next(place for place, rung in enumerate(rungs) if rung.adjustable)
+    steps = [(rung.name, 1.0) for rung in rungs[:first]]
     tols = TOLS if tol is None else (max(tol, FINEST),)
-    steps += [(rung, one) for rung in ("harmonic_balance", "ode") for one in tols]
+    steps += [(rung.name, one) for rung in rungs[first:] if rung.adjustable for one in tols]
     return [(rung, one) for rung, one in steps if not refusal(rung, question)]

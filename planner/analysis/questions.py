@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Device, Outcome, Response, Setting, Start, load_rung, solve
+from chainsim import DEFLECTION, VIBRATION, Chain, Device, Outcome, Response, Setting, Start, load_rung, solve
 
 from ..errors import PlanError
 from ..operating_point import OperatingPoint, setting_of
@@ -33,8 +33,6 @@ Complexes = NDArray[np.complex128]
 
 TOLS = (1e-2, 1e-4, 1e-6, 1e-9)
 FINEST = 1e-12
-# Rungs that answer a deflection in their own way.
-STILL = ("static", "linear", "ode")
 # From rest a sudden drive may lead to another answer than the planned one: farther away than this it has.
 SAME = 1e-2
 ANOTHER = 1.0
@@ -95,11 +93,12 @@ def refusal(rung: str, question: Question) -> str:
     """Why a rung cannot answer; "" when it can."""
     if rung == "auto":
         return ""
+    solver = load_rung(rung)
     if question.still:
-        return "" if rung in STILL else "nothing vibrates; static is exact"
-    if rung == "static":
+        return "" if DEFLECTION in solver.answers else "nothing vibrates; static is exact"
+    if VIBRATION not in solver.answers:
         return "a vibration; use a rung with harmonics"
-    return load_rung(rung).refusal(question.chain, question.setting, Start.REST)
+    return solver.refusal(question.chain, question.setting, Start.REST)
 
 
 def answer(rung: str, tol: float | None, question: Question) -> Response:
@@ -117,7 +116,7 @@ def same(answer: Response, question: Question, motion: Complexes) -> NDArray[np.
     with np.errstate(invalid="ignore"):
         away = np.abs(felt(answer, question) - motion).max(axis=1)
     # An answer of low accuracy is an answer: only what misses by the motion itself is another one.
-    near = away <= (SAME if answer.rung == "ode" else ANOTHER) * np.abs(motion).max(axis=1)
+    near = away <= (SAME if load_rung(answer.rung).full_equations else ANOTHER) * np.abs(motion).max(axis=1)
     has = np.array([one not in LOST for one in answer.outcome])
     return np.asarray(near & has)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device
+from chainsim import DEFLECTION, RUNGS, TERMS as STEADY_TERMS, VIBRATION, Device, load_rung
 
 from ..errors import PlanError
 from ..plan import FramePlan
@@ -78,11 +78,9 @@ class Requirement:
     @property
     def rung(self) -> str:
         """The cheapest steady rung that has every steady term which is required."""
-        if not self.moving:
-            return "static"
-        if "nonlinearity" not in self.included:
-            return "linear"
-        return "harmonic_balance" if self.included & {"third harmonic", "preload"} else "one_harmonic"
+        kind, required = VIBRATION if self.moving else DEFLECTION, self.included & STEADY_TERMS
+        rungs = (load_rung(name) for name in RUNGS)
+        return next(rung.name for rung in rungs if kind in rung.answers and required <= rung.models)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""

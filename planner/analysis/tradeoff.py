@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import RUNGS, Device, Response, Stats
+from chainsim import RUNGS, Device, Response, Stats, load_rung
 
 from ..plan import FramePlan
 from .questions import (
@@ -37,8 +37,6 @@ Run = Callable[[], list[Response]]
 Price = Callable[[Run], tuple[list[Response], float]]
 """Makes a run, and gives its answers and what they cost in seconds."""
 
-# Rungs whose work grows with the accuracy asked for; the others give what they have.
-ADJUSTABLE = ("harmonic_balance", "ode", "auto")
 REPEATS, LONG_S = 3, 0.3
 
 
@@ -187,7 +185,7 @@ def trade_off(frames: Iterable[FramePlan], device: Device, *, price: Price = by_
     for rung in (*RUNGS, "auto"):
         asked = [(_stand_in(rung, one, questions), one) for one in questions]
         why = next((text for name, one in asked if (text := refusal(name, one))), "")
-        for tol in () if why else TOLS if rung in ADJUSTABLE else (None,):
+        for tol in () if why else TOLS if rung == "auto" or load_rung(rung).adjustable else (None,):
             row = _measured(rung, tol, asked, [each.motion for each in references], price)
             if not row.solved:
                 why = "it finds the planned motion of no chain"

@@ -1,4 +1,4 @@
-"""Reading what is to be encoded: UTF-8 text, Unicode Braille or BRF; everything else is refused by name."""
+"""What is to be encoded, checked: from characters, bytes, a file or a stream."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from typing import BinaryIO
 
 from ...errors import EmptyText, InvalidText, UnsupportedSource
 from ...reading import first_bytes
-from .brf import brf_to_cells
+from .formats import MAX_BYTES, check_suffix, reader_of
 
 __all__ = ["SourceKind", "TextSource"]
-
-# A thick book has some megabytes.
-MAX_BYTES = 64_000_000
 
 
 class SourceKind(StrEnum):
@@ -69,8 +66,8 @@ class TextSource:
         return cls(lines, kind, name)
 
     @classmethod
-    def of_bytes(cls, data: bytes, name: str = "text", *, brf: bool = False) -> TextSource:
-        """A source from the bytes of a file: UTF-8, or ASCII Braille when `brf`.
+    def of_bytes(cls, data: bytes, name: str = "text", *, suffix: str = "") -> TextSource:
+        """A source from the bytes of a file with this ending (such as ``.brf``; '' for none), by `readers.formats`.
 
         Raises
         ------
@@ -81,24 +78,16 @@ class TextSource:
         EmptyText
             When there is nothing to show.
         """
-        known = _sniff(data)
-        if known:
-            raise UnsupportedSource(f"{name}: this is {known}; {_READ}")
-        nul = data.find(b"\0")
-        if nul >= 0:
-            raise InvalidText(f"{name}: a NUL byte at byte {nul}; remove it (is this really a text?)")
+        reader = reader_of(data, suffix, name)
         try:
-            text = brf_to_cells(data) if brf else data.decode("utf-8")
-        except UnicodeDecodeError as error:
-            bad = data[error.start]
-            raise InvalidText(f"{name}: not UTF-8 at byte {error.start} (0x{bad:02x}); save it as UTF-8") from None
+            text = reader.read(data)
         except InvalidText as error:
             raise InvalidText(f"{name}: {error}") from None
         return cls.of_text(text, name)
 
     @classmethod
     def of_path(cls, path: Path) -> TextSource:
-        """A source from a file; ``.brf`` and ``.brl`` are ASCII Braille.
+        """A source from a file.
 
         Raises
         ------
@@ -106,70 +95,29 @@ class TextSource:
             As `of_bytes` does; also when the suffix says another kind, or the file cannot be read.
         """
         suffix = path.suffix.lower()
-        if suffix in _SUFFIXES:
-            raise UnsupportedSource(f"{path}: {_SUFFIXES[suffix]} is not read; {_READ}")
+        check_suffix(suffix, str(path))
         try:
             data = first_bytes(path, MAX_BYTES + 1)
         except (OSError, ValueError) as error:
             raise UnsupportedSource(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-        return cls._of_first(data, str(path), brf=suffix in {".brf", ".brl"})
+        return cls._of_first(data, str(path), suffix)
 
     @classmethod
-    def of_stream(cls, stream: BinaryIO, name: str = "standard input", *, brf: bool = False) -> TextSource:
+    def of_stream(cls, stream: BinaryIO, name: str = "standard input", *, suffix: str = "") -> TextSource:
         """A source from a binary stream, read once to its end, which comes within 64 MB; raises as `of_bytes` does."""
         try:
             data = stream.read(MAX_BYTES + 1)
         except OSError as error:
             raise UnsupportedSource(f"{name}: cannot be read: {error.strerror or error}") from None
-        return cls._of_first(data, name, brf=brf)
+        return cls._of_first(data, name, suffix)
 
     @classmethod
-    def _of_first(cls, data: bytes, name: str, *, brf: bool) -> TextSource:
+    def _of_first(cls, data: bytes, name: str, suffix: str) -> TextSource:
         """A source from the first bytes of something, which are one more than may be when it is too long."""
         if len(data) > MAX_BYTES:
             raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
-        return cls.of_bytes(data, name, brf=brf)
+        return cls.of_bytes(data, name, suffix=suffix)
 
 
-_READ = "give UTF-8 text, Unicode Braille or a BRF file"
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _NOT_BRAILLE = re.compile("[^\u2800-\u28ff\\s]")
-
-_MAGIC = (
-    (b"%PDF", "a PDF"),
-    (b"%!PS", "PostScript"),
-    (b"PK\x03\x04", "a zip archive (DOCX, ODT, EPUB and eBraille are such)"),
-    (b"{\\rtf", "RTF"),
-    (b"\xd0\xcf\x11\xe0", "an old Office document"),
-    (b"\x89PNG", "a PNG picture"),
-    (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"GIF8", "a GIF picture"),
-    (b"II*\0", "a TIFF picture"),
-    (b"MM\0*", "a TIFF picture"),
-    (b"RIFF", "a RIFF file (WAV, WEBP)"),
-    (b"\x1f\x8b", "a gzip archive"),
-    (b"BZh", "a bzip2 archive"),
-    (b"7z\xbc\xaf", "a 7z archive"),
-    (b"\x7fELF", "a program"),
-    (b"\xff\xfe\0\0", "UTF-32 text"),
-    (b"\0\0\xfe\xff", "UTF-32 text"),
-    (b"\xff\xfe", "UTF-16 text"),
-    (b"\xfe\xff", "UTF-16 text"),
-)
-_MARKUP = ((b"<!doctype html", "HTML"), (b"<html", "HTML"), (b"<svg", "an SVG picture"), (b"<?xml", "XML"))
-
-_SUFFIXES = {
-    ".pdf": "PDF", ".ps": "PostScript", ".docx": "DOCX", ".doc": "DOC", ".odt": "ODT", ".rtf": "RTF",
-    ".epub": "EPUB", ".ebrl": "eBraille", ".pef": "PEF", ".html": "HTML", ".htm": "HTML", ".xml": "XML",
-    ".png": "a PNG picture", ".jpg": "a JPEG picture", ".jpeg": "a JPEG picture", ".gif": "a GIF picture",
-    ".bmp": "a BMP picture", ".tif": "a TIFF picture", ".tiff": "a TIFF picture", ".webp": "a WEBP picture",
-    ".svg": "an SVG picture", ".zip": "a zip archive", ".gz": "a gzip archive",
-}  # fmt: skip
-
-
-def _sniff(data: bytes) -> str:
-    for magic, kind in _MAGIC:
-        if data.startswith(magic):
-            return kind
-    start = data[:256].removeprefix(b"\xef\xbb\xbf").lstrip().lower()
-    return next((kind for magic, kind in _MARKUP if start.startswith(magic)), "")

@@ -1,0 +1,108 @@
+"""A controller on a serial port, over dotwave's own protocol."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..formats.samples import SampleReader
+from ..protocol.host_session import HostSession, StreamReport, Timing
+from ..protocol.outgoing import session_messages
+from ..protocol.playout import BUFFER_S
+from ..waveform.manifest import Manifest
+from .base import SinkError, SinkReport
+from .serial_play import run_session
+from .uart import Uart
+
+__all__ = ["Controller", "buffer_notes"]
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A sink: the controller at `port`.
+
+    Attributes
+    ----------
+    port : such as /dev/ttyACM0. baud : bits per second, None: the controller's own.
+    patience_s : how long to wait for a controller that is not heard.
+    """
+
+    port: str
+    baud: int | None = None
+    patience_s: float = 10.0
+
+    def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
+        """Nothing more than the gate asks: what the controller can do is known once it answers."""
+        return SinkReport()
+
+    def play(self, manifest: Manifest, samples: SampleReader, progress: Callable[[float], None]) -> SinkReport:
+        """Run a session to its end.
+
+        Raises
+        ------
+        DriverError
+            As `run_session`; SinkError when no port was given.
+        """
+        if not self.port:
+            raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
+        number = random.SystemRandom().randrange(1, 1 << 32)
+        session = HostSession(
+            lambda found: session_messages(manifest, samples, found, session=number), session=number, timing=Timing()
+        )
+        run_session(session, self._line, patience_s=self.patience_s, progress=progress)
+        stream = session.report
+        rounding = f"off by at most {1e3 * manifest.device.amplifier.volts / 65534:.2f} mV"
+        return SinkReport(
+            ok=stream.underruns == 0 and stream.lost_s == 0,
+            facts={"stream": _plain(stream)},
+            lines=_lines(stream),
+            notes=(f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream)),
+        )
+
+    def close(self) -> None:
+        """Nothing stays open after `play`."""
+
+    def _line(self) -> Uart:
+        return Uart(self.port) if self.baud is None else Uart(self.port, self.baud)
+
+
+def buffer_notes(stream: StreamReport) -> tuple[str, ...]:
+    """What to do about a buffer that ran dry, or would on a busy machine."""
+    if stream.underruns:
+        return (
+            f"The buffer ran dry: it holds {stream.buffer_s:.2f} s, and for up to {stream.longest_pause_s:.2f} s "
+            f"nothing could be sent. Close other programs, or give the controller room for more.",
+        )
+    if stream.buffer_s < BUFFER_S:
+        return (
+            f"The controller holds {stream.buffer_s:.2f} s: enough while this machine has little else to do, but "
+            f"when it is busy {BUFFER_S:g} s are needed.",
+        )
+    return ()
+
+
+def _lines(stream: StreamReport) -> tuple[str, ...]:
+    late, reported = (
+        1e3 * max(map(abs, values.values()), default=0.0) for values in (stream.late_s, stream.reported_late_s)
+    )
+    return (
+        f"{stream.samples} samples in {stream.packets} packets, {stream.resent} sent again, {stream.reconnects} "
+        f"reconnections, {stream.bad_there + stream.bad_here} broken packets seen",
+        f"{stream.underruns} underruns, {stream.lost_s:.2f} s lost, least in store "
+        f"{1e3 * _finite(stream.least_buffer_s):.0f} ms, frames within {late:.1f} ms of their marks, reported "
+        f"within {reported:.1f} ms",
+    )
+
+
+def _plain(stream: StreamReport) -> dict[str, Any]:
+    plain = asdict(stream)
+    for name in ("late_s", "reported_late_s"):
+        plain[name] = {str(frame): late for frame, late in plain[name].items()}
+    plain["least_buffer_s"] = _finite(stream.least_buffer_s)
+    return plain
+
+
+def _finite(value: float) -> float:
+    return value if value < float("inf") else 0.0
