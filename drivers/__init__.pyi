@@ -30,10 +30,15 @@ from .files.whole import (
     settled as settled,
 )
 from .formats.samples import (
-    EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
-    SUFFIXES as SUFFIXES,
     SampleReader as SampleReader,
     SampleWriter as SampleWriter,
+)
+from .formats.table import (
+    EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
+    FORMATS as FORMATS,
+    SUFFIXES as SUFFIXES,
+    Format as Format,
+    check_suffix as check_suffix,
 )
 from .formats.wav import (
     Encoding as Encoding,
@@ -144,4 +149,8 @@ from .waveform.manifest_reader import (
 )
 from .waveform.sampling import (
     Waveform as Waveform,
+)
+from .writing import (
+    WrittenPlan as WrittenPlan,
+    write_plan as write_plan,
 )

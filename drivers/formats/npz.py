@@ -21,7 +21,7 @@ from ..errors import UnreadableWaveform
 from ..files.whole import naming
 from .raw import check_finite
 
-__all__ = ["NpzReader", "NpzWriter"]
+__all__ = ["NpzReader", "NpzWriter", "open_reader", "open_writer"]
 
 Floats = NDArray[np.float64]
 
@@ -138,3 +138,11 @@ def _header(member: IO[bytes]) -> NpyHeader:
     if header.fortran or header.dtype != np.dtype("<f8"):
         raise ValueError(f"volts are {header.dtype}, expected little-endian float64 in C order")
     return header
+
+
+def open_writer(file: BinaryIO, channels: Sequence[Channel], rate_hz: int, _encoding: str) -> NpzWriter:
+    """A writer on an open and empty file."""
+    return NpzWriter(file, channels, rate_hz)
+
+
+open_reader = NpzReader.open
