@@ -173,7 +173,7 @@ def map_of_settings(side: int, rounds: int) -> dict[str, Any]:
     """``dotwave sweep`` of side x side settings to NPZ and PNG: the whole command, from its start to its end."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "map.yaml").write_text(MAP.format(side=side), encoding="utf-8")
-        call = [sys.executable, "-c", "from dotwave.cli import main; main()", "sweep", "map.yaml", "-o", "map.npz"]
+        call = [sys.executable, "-c", "from dotwave.cli.app import main; main()", "sweep", "map.yaml", "-o", "map.npz"]
         call += ["--only", "epsilon,omega,outcome,phase_step_deg,stable", "--picture", "map.png", "--json"]
         walls, solving = [], []
         for _ in range(rounds + 1):

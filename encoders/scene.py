@@ -89,15 +89,17 @@ class Frame:
 
 @dataclass(frozen=True)
 class Scene:
-    """A sequence of frames, made lazily: iterating `frames` again encodes again.
+    """A sequence of frames, made lazily: iterating `frames` again encodes again what is long.
 
     Attributes
     ----------
     shape : the grid it is laid out for.
     frames : iterable of `Frame`.
     encoding : plain JSON values that let a reader decode the frames (tables, layout, presentation).
+    parts : a line on each thing that is shown, for a person.
     """
 
     shape: GridShape
     frames: Iterable[Frame]
     encoding: Mapping[str, Any] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()

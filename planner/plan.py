@@ -170,6 +170,11 @@ class FramePlan:
     note: str = ""
     spread: FrameSpread | None = None
 
+    @property
+    def error(self) -> float:
+        """Predicted worst deviation of any actuator from what is aimed at, in units of full scale."""
+        return max(state.error for state in self.states)
+
 
 @dataclass(frozen=True)
 class Plan:

@@ -64,7 +64,7 @@ def offered(words: str, folder: Path, shell: str = "bash") -> subprocess.Complet
         "_TYPER_COMPLETE_FISH_ACTION": "get-args",
     }  # fmt: skip
     code = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); "
-    code += "from dotwave.cli import main; main()"
+    code += "from dotwave.cli.app import main; main()"
     command = [sys.executable, "-c", code]
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 

@@ -156,7 +156,7 @@ HOST = """
 import sys
 import time
 from pathlib import Path
-from dotwave.play import play
+from dotwave.playing.play import play
 while not Path(sys.argv[1]).exists():
     time.sleep(0.01)
 play(Path(sys.argv[2]), live=True, port=sys.argv[1])

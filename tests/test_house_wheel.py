@@ -39,7 +39,7 @@ def test_wheel(tmp_path: Path) -> None:
     }
     assert {name for name in inside if ".dist-info" not in name} == wanted
     start = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); import dotwave; print(dotwave.__file__); "
-    start += "from dotwave.cli import main; sys.argv = ['dotwave', 'devices']; main()"
+    start += "from dotwave.cli.app import main; sys.argv = ['dotwave', 'devices']; main()"
     ran = subprocess.run([sys.executable, "-I", "-c", start], capture_output=True, text=True, cwd=tmp_path, check=True)
     assert ran.stdout.startswith(str(tmp_path / "site"))
     assert "linked-6x6:" in ran.stdout

@@ -106,6 +106,11 @@ class TexturePart(Part):
             raise ValueError("give exactly one of wave, bars, walking_bars, levels, regions")
         return self
 
+    @property
+    def kind(self) -> str:
+        """The key that is given."""
+        return next(name for name, value in self if name != "dwell_s" and value is not None)
+
     def target(self, shape: GridShape) -> TargetPattern:
         """The texture on a grid.
 

@@ -1,4 +1,7 @@
-"""The file formats, one entry each: what a name's ending stands for. A new format is an entry and its module."""
+"""The file formats, one entry each: what a name's ending stands for. A new format is an entry and its module.
+
+Light to import, so that a command line can list them.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,6 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-from ..errors import FileError
 
 __all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "SUFFIXES", "Format", "check_suffix", "format_of"]
 
@@ -76,6 +77,8 @@ def check_suffix(path: Path, accepted: tuple[str, ...] = tuple(FORMATS)) -> str:
     FileError
         When it is not one of those accepted (the message lists them), or the name cannot stand in a manifest.
     """
+    from ..errors import FileError
+
     suffix = path.suffix.lower()
     try:
         path.name.encode()

@@ -81,6 +81,8 @@ class PictureOptions:
     dwell_s : seconds a frame is shown when the file does not say.
     candidates : how many good patterns of each frame the report lists (on/off only).
 
+    A choice may be given as its word.
+
     Raises
     ------
     PictureError
@@ -132,6 +134,7 @@ class PictureOptions:
             given = getattr(self, name)
             if given is not None and given not in list(kind):
                 raise PictureError(f"picture.{name}: expected one of {', '.join(kind)}, got {given!r}")
+            object.__setattr__(self, name, None if given is None else kind(given))
 
     def resolved(self, style: Style) -> PictureOptions:
         """The same options with the defaults of `style` (icon or photo) in place of None."""
