@@ -147,8 +147,8 @@ def announce(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
 
 ORPHANS = """
 import sys
-from dotwave.icon_pool import LocalPool
-from dotwave.icon_work import Task
+from dotwave.icon_sets.pool import LocalPool
+from dotwave.icon_sets.work import Task
 from tests.test_icons_workers import announce
 if __name__ == "__main__":
     with LocalPool(2, 1e6) as pool:

@@ -106,7 +106,7 @@ def text(
     >>> import dotwave as dw
     >>> scene = dw.text("Hello world", "linked-6x6")
     >>> [frame.text for frame in scene.frames]
-    ['Hello ', 'world']
+    ['Hello', 'world']
     """
     profile = _device(device)
     given = source if isinstance(source, TextSource) else _source(source)
@@ -146,7 +146,7 @@ def image(
     --------
     >>> import dotwave as dw
     >>> dw.image("samples/icons/heart.svg").parts
-    ('icon: heart.svg, similarity 0.82',)
+    ('icon: heart.svg, similarity 0.88',)
     """
     profile = _device(device)
     chosen = pitched(replace(options or PictureOptions(), **changes), profile)
@@ -263,7 +263,7 @@ def job(path: str | PathLike[str]) -> Scene:
     --------
     >>> import dotwave as dw
     >>> dw.job("samples/jobs/mixed.yaml").device.name
-    'paper-6x6'
+    'wide'
     """
     from ..jobs.scene import read_job_scene
 

@@ -22,7 +22,7 @@ from .paths import Reach
 __all__ = ["JobScene", "read_job_scene"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class JobScene(Scene):
     """A job that was read and encoded: all its parts as one scene.
 

@@ -114,6 +114,11 @@ class FrameCheck:
     text: str = ""
 
     @property
+    def amplitude(self) -> Floats:
+        """What is felt, in units of full scale; float64, shape (rows, cols)."""
+        return self.felt
+
+    @property
     def ramp_s(self) -> float:
         """Length of the way into the frame, seconds."""
         return self.settled_s - self.start_s

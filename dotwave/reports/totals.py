@@ -52,7 +52,7 @@ class Totals:
     def add(self, frame: FramePlan) -> None:
         """Take a frame into account."""
         if frame.frame is not None or frame.outcome is not Outcome.OK:
-            self.outcomes[frame.outcome] = self.outcomes.get(frame.outcome, 0) + 1
+            self.outcomes[str(frame.outcome)] = self.outcomes.get(str(frame.outcome), 0) + 1
         if frame.frame is not None and frame.frame.page != self._page:
             self._page = frame.frame.page
             self.pages += 1

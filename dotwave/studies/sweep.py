@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from .sweep_files import Arrays, Parts
 
-__all__ = ["FIELDS", "SweepReport", "run_sweep"]
+__all__ = ["FIELDS", "SweepReport", "answers", "run_sweep"]
 
 FIELDS = (
     "epsilon", "lam", "omega", "outcome", "phasor", "phase_step_deg", "third", "mean", "stable", "locked",
@@ -151,7 +151,7 @@ def _solve_in_process(source: Path, stored: Parts, first: int, chunk: int, field
 
 
 def _solve_part(sweep: SettingSweep, stored: Parts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
-    solved = _answers(sweep, first, first + chunk, fields)
+    solved = answers(sweep, first, first + chunk, fields)
     # The outcome is counted for the report whether or not it is asked for.
     stored.save(first, solved)
 
@@ -164,7 +164,8 @@ def _counted(stored: Parts) -> dict[str, int]:
     return counts
 
 
-def _answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]) -> Arrays:
+def answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]) -> Arrays:
+    """Solve the settings first..last-1; their outcomes and `fields` by name, each with an entry a setting."""
     from chainsim import sweep as solve_many
 
     setting = sweep.settings(first, last)

@@ -46,6 +46,10 @@ class NpzWriter:
         self._waiting = tempfile.TemporaryFile()  # noqa: SIM115 - closed by finish, or with the writer
         self.samples = 0
 
+    def __del__(self) -> None:
+        # A writer that was given up has not finished.
+        self._waiting.close()
+
     def write(self, block: Floats) -> None:
         """Append samples; float64, shape (S, channels), volts."""
         self._waiting.write(block.astype("<f8", order="C").data)

@@ -76,7 +76,7 @@ class TextOptions:
             object.__setattr__(self, name, kind(given))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TextScene(Scene):
     """A scene of Braille; `text_frames` are its frames with their report and check."""
 
