@@ -116,7 +116,7 @@ def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options)
 
 @pytest.mark.parametrize(("report", "code"), [(GOOD, 0), (BAD, 1), (replace(GOOD, text_equal=False), 1)])
 def test_verify_exit_code(dotwave, stand_in, report, code) -> None:
-    stand_in("verification", verify=lambda path: report)
+    stand_in("api.felt", verify=lambda path: report)
     assert dotwave("verify", "x.wav").code == code
     assert json.loads(dotwave("verify", "x.wav", "--json").out)["ok"] is (code == 0)
 
@@ -128,7 +128,7 @@ def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
     def fail(path: Path) -> VerifyReport:
         raise root(f"{path}: what is wrong\nand the cure")
 
-    stand_in("verification", verify=fail)
+    stand_in("api.felt", verify=fail)
     ended = dotwave("verify", "x.wav")
     assert (ended.code, ended.out, ended.err) == (2, "", "dotwave: x.wav: what is wrong and the cure\n")
 
@@ -137,7 +137,7 @@ def test_ctrl_c_is_130(dotwave, stand_in) -> None:
     def interrupt(path: Path) -> VerifyReport:
         raise KeyboardInterrupt
 
-    stand_in("verification", verify=interrupt)
+    stand_in("api.felt", verify=interrupt)
     assert dotwave("verify", "x.wav").code == 130
 
 

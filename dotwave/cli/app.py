@@ -154,7 +154,7 @@ def verify(out: Written, as_json: Json = False) -> None:
     Example:
       dotwave verify hello.wav
     """
-    from ..verification import verify as check
+    from ..api.felt import verify as check
 
     report = check(Path(out))
     _finish(report, as_json, ok=report.ok)
@@ -177,8 +177,8 @@ def preview(
     Example:
       dotwave preview hello.wav
     """
+    from ..api.felt import verify as check
     from ..figures.preview import write_preview
-    from ..verification import verify as check
 
     report = write_preview(check(Path(out)), output or Path(out).with_suffix(".preview"))
     _finish(report, as_json, ok=True)
