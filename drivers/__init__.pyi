@@ -18,7 +18,7 @@ from .files.locks import (
     held as held,
 )
 from .files.parts import (
-    Part as Part,
+    PartFile as PartFile,
     is_at as is_at,
     part_of as part_of,
 )
@@ -53,8 +53,8 @@ from .protocol.emulator import (
 )
 from .protocol.faults import (
     Faults as Faults,
+    FaultWindow as FaultWindow,
     FaultyLine as FaultyLine,
-    Window as Window,
 )
 from .protocol.felt import (
     FeltGrid as FeltGrid,

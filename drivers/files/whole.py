@@ -13,7 +13,7 @@ from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO
 
 from ..errors import FileError
-from .parts import Belongs, Part, finish, is_at, make, settle, sync_folder
+from .parts import Belongs, PartFile, finish, is_at, make, settle, sync_folder
 
 __all__ = ["atomic_file", "atomic_files", "made_folder", "naming", "settled"]
 
@@ -98,7 +98,7 @@ def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple
 @contextmanager
 def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[BinaryIO, ...]]:
     folder, token = paths[0].parent, secrets.token_hex(8)
-    parts = [Part(path, token) for path in paths]
+    parts = [PartFile(path, token) for path in paths]
     files: list[BinaryIO] = []
     place = os.path.abspath(folder)
     _tidy(place, paths, belongs or {path.name for path in paths}.__contains__)
@@ -132,7 +132,7 @@ def settled(path: Path, belongs: Belongs) -> None:
         settle(path.parent, belongs, others=False)
 
 
-def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
+def _make_count(parts: Sequence[PartFile], files: Sequence[BinaryIO]) -> None:
     """Bring all files to the disk, then do the one rename that makes them count."""
     for part, file in zip(parts, files, strict=True):
         with naming(part.path):
@@ -150,7 +150,7 @@ def _make_count(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
     sync_folder(last.path.parent)
 
 
-def _finish(parts: Sequence[Part]) -> None:
+def _finish(parts: Sequence[PartFile]) -> None:
     try:
         finish(parts)
     except OSError as error:

@@ -17,7 +17,7 @@ from ..channels import Channel, Role, channels_of
 from .curve import curve
 from .hold import hold_inverse
 from .shaping import Shaper
-from .timeline import Stretch, stretches
+from .timeline import PlacedFrame, stretches
 
 __all__ = ["Waveform"]
 
@@ -136,7 +136,7 @@ class Waveform:
                     chunk *= step
                 yield chunk
 
-    def _chunk(self, stretch: Stretch, index: NDArray[np.intp]) -> Floats:
+    def _chunk(self, stretch: PlacedFrame, index: NDArray[np.intp]) -> Floats:
         frame, device = stretch.plan, self.device
         time_s = index / self.rate_hz
         since_s = time_s - frame.start_s
