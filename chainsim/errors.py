@@ -6,7 +6,17 @@ __all__ = ["ChainError", "ProfileError"]
 
 
 class ChainError(Exception):
-    """Root of everything `chainsim` raises on purpose."""
+    """Root of everything `chainsim` raises on purpose.
+
+    Examples
+    --------
+    >>> from chainsim import ChainError, load_device
+    >>> try:
+    ...     load_device("paper")
+    ... except ChainError as error:
+    ...     print(str(error).split(";")[0][:37])
+    device 'paper': not a built-in profil
+    """
 
 
 class ProfileError(ChainError, ValueError):

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
-__all__ = ["AppError", "Declined", "Terminated", "bad_input"]
+__all__ = ["AppError", "Declined", "NotMade", "Terminated", "bad_input"]
 
 
 class AppError(Exception):
     """Root of everything `dotwave` raises on purpose; the command line ends with exit code 2.
 
-    Examples: an argument looks like a file that does not exist; a picture cannot be written because
+    Cases: an argument looks like a file that does not exist; a picture cannot be written because
     its folder is read-only.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> try:
+    ...     dw.plan(dw.text("Hello"))
+    ... except dw.AppError as error:
+    ...     print(error)
+    plan: no device was given; give the one that the scene was laid out for
+    """
+
+
+class NotMade(AppError):
+    """A frame cannot be made as asked, so nothing was written.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> ring = dw.device("paper-6x6-ring")
+    >>> try:
+    ...     dw.plan(dw.text("Hello", ring), ring).waveform().samples(0.0, 0.1)
+    ... except dw.NotMade as error:
+    ...     print(error)
+    Frame 1: paper-6x6-ring cannot make this pattern: ...
     """
 
 

@@ -1,4 +1,4 @@
-"""What a person asks of a plan beside the plan itself: how exact, how quick, and what it costs."""
+"""What a person asks of a run: how exact, how quick, in which numbers, and what is to be told beside."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from drivers import Encoding
+from planner import DEFAULT_CONTRAST_DB
 
 from .errors import AppError
 
-__all__ = ["TOLERANCES", "Asked", "FrameAsked", "asked_of", "frame_asked", "picture_name", "seconds_of", "tolerance_of"]
+__all__ = [
+    "TOLERANCES", "FrameRequest", "Request", "frame_request", "picture_name", "request_of", "seconds_of",
+    "tolerance_of",
+]  # fmt: skip
 
 TOLERANCES = {"draft": 0.1, "normal": 0.02, "fine": 0.005}
 """Largest predicted deviation of an actuator from what is wanted, in units of full scale."""
@@ -18,7 +25,7 @@ UNITS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "": 1.0}
 
 
 @dataclass(frozen=True)
-class FrameAsked:
+class FrameRequest:
     """A frame, counted from 1, whose choices are listed and, with a picture, drawn."""
 
     number: int
@@ -26,36 +33,43 @@ class FrameAsked:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked; None and False: nothing.
+class Request:
+    """What is asked of a run; None and False: nothing.
 
     Attributes
     ----------
     tol : largest deviation of an actuator, in units of full scale. budget_s : seconds for planning.
     explain : list what the scene requires. pareto : list what a frame can be bought for.
+    contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
+    encoding : number format of samples. actuator : (row, col) that a haptic file of one actuator shows; None is the
+        mean over the grid. yes : do not ask before a very large file.
     """
 
     tol: float | None = None
     budget_s: float | None = None
     explain: bool = False
-    pareto: FrameAsked | None = None
+    pareto: FrameRequest | None = None
+    contrast_db: float = DEFAULT_CONTRAST_DB
+    encoding: Encoding = "float32"
+    actuator: tuple[int, int] | None = None
+    yes: bool = False
 
 
-def asked_of(
-    *, tol: str | None = None, budget: str | None = None, explain: bool = False, pareto: str | None = None
-) -> Asked:
-    """What options of the command line ask for.
+def request_of(
+    *, tol: str | None = None, budget: str | None = None, pareto: str | None = None, **given: Any
+) -> Request:
+    """What options of the command line ask for; those that need no reading are given on as they are.
 
     Raises
     ------
     AppError
         When one cannot be read.
     """
-    return Asked(
-        None if tol is None else tolerance_of(tol),
-        None if budget is None else seconds_of(budget),
-        explain,
-        None if pareto is None else frame_asked(pareto),
+    return Request(
+        tol=None if tol is None else tolerance_of(tol),
+        budget_s=None if budget is None else seconds_of(budget),
+        pareto=None if pareto is None else frame_request(pareto),
+        **given,
     )
 
 
@@ -96,7 +110,7 @@ def seconds_of(words: str) -> float:
     return number * UNITS[found[2]]
 
 
-def frame_asked(words: str) -> FrameAsked:
+def frame_request(words: str) -> FrameRequest:
     """A frame's number, a picture's name for the first frame, or both with a colon between: ``2:ways.png``.
 
     Raises
@@ -107,7 +121,7 @@ def frame_asked(words: str) -> FrameAsked:
     number, _, name = words.partition(":") if words.partition(":")[0].isdecimal() else ("1", ":", words)
     if int(number) < 1 or not words or (":" in words and not name):
         raise AppError(f"--pareto: expected a frame from 1, a picture, or 2:ways.png, got {words!r}")
-    return FrameAsked(int(number), picture_name(Path(name)) if name else None)
+    return FrameRequest(int(number), picture_name(Path(name)) if name else None)
 
 
 def picture_name(path: Path) -> Path:

@@ -30,7 +30,7 @@ BLOCK_VALUES = 1 << 20
 GRADED = (0.3, 0.9)
 
 
-class Felt(NamedTuple):
+class _Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
     `level` is what is compared with the target: the mean of a bias pattern, else the amplitude at the
@@ -111,7 +111,7 @@ class _Integration:
             self._first += 1
         self.position += len(volts)
 
-    def felt(self) -> Iterator[Felt]:
+    def felt(self) -> Iterator[_Felt]:
         """What each frame makes felt."""
         for fit in self._fits:
             yield fit.felt()
@@ -149,12 +149,12 @@ class _Fit:
             self._gram[row] += basis @ basis.T
             self._load[row] += basis @ z[inside, row]
 
-    def felt(self) -> Felt:
+    def felt(self) -> _Felt:
         """What is felt; NaN where the frame has too few samples to tell."""
         full, shape, mark = self._device.full_scale, (self._device.rows, self._device.cols), self._mark
         if self._gram[0][0, 0] < max(map(len, self._gram)):
             nothing = np.full(shape, np.nan)
-            return Felt(nothing, nothing, nothing, nothing)
+            return _Felt(nothing, nothing, nothing, nothing)
         still, phasor, moving = np.empty(shape), np.empty(shape, dtype=np.complex128), np.empty(shape)
         worst = np.empty(shape)
         for row, (gram, load) in enumerate(zip(self._gram, self._load, strict=True)):
@@ -166,7 +166,7 @@ class _Fit:
         standing = ~np.array(mark.moving)
         worst[standing] = np.abs(still - mark.target)[standing]
         level = np.where(standing[:, np.newaxis], still, moving)
-        return Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
+        return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
 
     def _out_of_phase(self, phasor: Complexes) -> Floats:
         """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""
@@ -186,7 +186,7 @@ def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
     return own + sorted({2 * one - other for one in own for other in own} - set(own))
 
 
-def _check(mark: FrameMark, felt: Felt) -> FrameCheck:
+def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
     wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
     # A level wanted at the threshold itself may be felt on either side of it.
     near = np.abs(felt.level - mark.target) <= AMPLITUDE_ERROR_LIMIT

@@ -18,7 +18,7 @@ from .files.locks import (
     held as held,
 )
 from .files.parts import (
-    Part as Part,
+    PartFile as PartFile,
     is_at as is_at,
     part_of as part_of,
 )
@@ -30,10 +30,15 @@ from .files.whole import (
     settled as settled,
 )
 from .formats.samples import (
-    EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
-    SUFFIXES as SUFFIXES,
     SampleReader as SampleReader,
     SampleWriter as SampleWriter,
+)
+from .formats.table import (
+    EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
+    FORMATS as FORMATS,
+    SUFFIXES as SUFFIXES,
+    Format as Format,
+    check_suffix as check_suffix,
 )
 from .formats.wav import (
     Encoding as Encoding,
@@ -48,8 +53,8 @@ from .protocol.emulator import (
 )
 from .protocol.faults import (
     Faults as Faults,
+    FaultWindow as FaultWindow,
     FaultyLine as FaultyLine,
-    Window as Window,
 )
 from .protocol.felt import (
     FeltGrid as FeltGrid,
@@ -157,4 +162,8 @@ from .waveform.manifest_reader import (
 )
 from .waveform.sampling import (
     Waveform as Waveform,
+)
+from .writing import (
+    WrittenPlan as WrittenPlan,
+    write_plan as write_plan,
 )

@@ -8,7 +8,17 @@ __all__ = ["DriverError", "FileError", "LimitError", "UnreadableWaveform", "Wave
 
 
 class DriverError(Exception):
-    """Root of everything `drivers` raises on purpose."""
+    """Root of everything `drivers` raises on purpose.
+
+    Examples
+    --------
+    >>> from drivers import DriverError, read_waveform
+    >>> try:
+    ...     read_waveform("nowhere.wav")
+    ... except DriverError as error:
+    ...     print(error)
+    nowhere.wav: no such file; ...
+    """
 
 
 class WaveformError(DriverError, ValueError):

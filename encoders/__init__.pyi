@@ -5,6 +5,10 @@ from .braille.back_check import (
     back_translate as back_translate,
     covered_text as covered_text,
 )
+from .braille.choices import (
+    Presentation as Presentation,
+    Undefined as Undefined,
+)
 from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,
@@ -17,7 +21,6 @@ from .braille.louis_binding import (
     liblouis_version as liblouis_version,
 )
 from .braille.presentation import (
-    Presentation as Presentation,
     read_cells as read_cells,
 )
 from .braille.readers.brf import (
@@ -53,9 +56,6 @@ from .braille.text import (
 from .braille.transcribe import (
     Translation as Translation,
     translate as translate,
-)
-from .braille.undefined import (
-    Undefined as Undefined,
 )
 from .errors import (
     EmptyText as EmptyText,

@@ -15,7 +15,17 @@ __all__ = [
 
 
 class EncodeError(Exception):
-    """Root of everything `encoders` raises on purpose."""
+    """Root of everything `encoders` raises on purpose.
+
+    Examples
+    --------
+    >>> from encoders import EncodeError, GridShape, TextOptions, encode_text
+    >>> try:
+    ...     encode_text("Hello", GridShape(6, 6), TextOptions(rate=0.0))
+    ... except EncodeError as error:
+    ...     print(error)
+    rate: expected a number > 0, got 0.0
+    """
 
 
 class LouisMissing(EncodeError, ImportError):

@@ -87,17 +87,29 @@ class Frame:
     cells: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
-    """A sequence of frames, made lazily: iterating `frames` again encodes again.
+    """A sequence of frames, made lazily: iterating `frames` again encodes again what is long.
 
     Attributes
     ----------
     shape : the grid it is laid out for.
     frames : iterable of `Frame`.
     encoding : plain JSON values that let a reader decode the frames (tables, layout, presentation).
+    parts : a line on each thing that is shown, for a person.
+
+    Examples
+    --------
+    >>> from encoders import GridShape, TextOptions, encode_text
+    >>> scene = encode_text("Hello", GridShape(6, 6), TextOptions())
+    >>> [(frame.text, frame.dwell_s) for frame in scene.frames]
+    [('Hello', 1.0)]
     """
 
     shape: GridShape
     frames: Iterable[Frame]
     encoding: Mapping[str, Any] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.shape.rows} x {self.shape.cols}, {', '.join(self.parts)})"

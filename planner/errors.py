@@ -6,7 +6,19 @@ __all__ = ["ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit"]
 
 
 class PlanError(Exception):
-    """Root of everything `planner` raises on purpose."""
+    """Root of everything `planner` raises on purpose.
+
+    Examples
+    --------
+    >>> from chainsim import load_device
+    >>> from encoders import GridShape, Scene
+    >>> from planner import PlanError, plan_scene
+    >>> try:
+    ...     plan_scene(Scene(GridShape(6, 6), ()), load_device("linked-40x96"))
+    ... except PlanError as error:
+    ...     print(error)
+    the scene is laid out for 6 x 6 actuators, linked-40x96 has 40 x 96
+    """
 
 
 class SceneDoesNotFit(PlanError, ValueError):

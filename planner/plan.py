@@ -72,7 +72,7 @@ class Ramp:
         return float(self.t_s[-1])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FramePlan:
     """One frame on the time line.
 
@@ -80,6 +80,19 @@ class FramePlan:
     means the chain already stands. `frame` is None for the way out after the last frame.
     `note` is one sentence when the outcome is not ok. `spread` is what the frame becomes under the device's spread,
     where it has one and the frame can be made.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from chainsim import load_device
+    >>> from encoders import Frame, GridShape, Scene, TargetPattern
+    >>> from planner import plan_scene
+    >>> scene = Scene(GridShape(6, 6), (Frame(TargetPattern(np.eye(6, dtype=complex)), dwell_s=1.0),))
+    >>> frame, way_out = plan_scene(scene, load_device("paper-6x6")).frames
+    >>> frame
+    FramePlan(0.000 to 1.000 s, settled at 0.060 s, ok)
+    >>> frame.error < 1e-6, len(frame.states), frame.states[0].target
+    (True, 6, array([1., 0., 0., 0., 0., 0.]))
     """
 
     frame: Frame | None
@@ -91,6 +104,15 @@ class FramePlan:
     outcome: Outcome = Outcome.OK
     note: str = ""
     spread: FrameSpread | None = None
+
+    def __repr__(self) -> str:
+        times = f"{self.start_s:.3f} to {self.end_s:.3f} s, settled at {self.settled_s:.3f} s"
+        return f"FramePlan({times}, {self.outcome})"
+
+    @property
+    def error(self) -> float:
+        """Predicted worst deviation of any actuator from what is aimed at, in units of full scale."""
+        return max(state.error for state in self.states)
 
 
 @dataclass(frozen=True)

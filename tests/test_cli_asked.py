@@ -12,8 +12,8 @@ from PIL import Image
 
 from chainsim import Outcome, load_device
 from dotwave.errors import AppError
-from dotwave.request import TOLERANCES, FrameAsked, asked_of, frame_asked, tolerance_of
-from dotwave.studies.study import Study
+from dotwave.request import TOLERANCES, FrameRequest, frame_request, request_of, tolerance_of
+from dotwave.studies.judge import Findings, Judge
 from encoders import GridShape, Scene, TextOptions, TextSource, encode_text
 from planner import FramePlan, Plan, plan_scene
 
@@ -44,16 +44,6 @@ def off_by(plan: Plan, error: float) -> Plan:
         return replace(frame, states=tuple(replace(state, error=error) for state in frame.states))
 
     return replace(plan, frames=[worse(frame) for frame in plan.frames])
-
-
-class Blank:
-    """A report without a word."""
-
-    def as_dict(self) -> dict[str, object]:
-        return {"ok": True}
-
-    def as_text(self) -> str:
-        return "Rendered."
 
 
 @pytest.mark.parametrize(("tol", "rung"), [("1e-2", "linear"), ("1e-4", "one_harmonic"), ("1e-9", "harmonic_balance")])
@@ -90,19 +80,17 @@ def test_dots_that_idle_above_the_tolerance_are_named(dotwave) -> None:
 @pytest.mark.parametrize("error", [0.004, 0.01, 0.05, 0.2])
 @pytest.mark.parametrize("name", [*TOLERANCES, "0.03"])
 def test_frames_that_are_off_by_more_are_not_ok(error: float, name: str) -> None:
-    study = Study(asked_of(tol=name))
-    (frame, *_) = study.watched(off_by(plan_of("a", "paper-6x6"), error))
+    judge = Judge(request_of(tol=name))
+    (frame, *_) = judge.judged(off_by(plan_of("a", "paper-6x6"), error))
     good = error <= tolerance_of(name)
     assert (frame.outcome is Outcome.OK) == good
     assert good or f"off by {100 * error:g} % of full scale, {100 * tolerance_of(name):g} % are allowed" in frame.note
 
 
 def test_without_a_tolerance_nothing_is_held_to_one() -> None:
-    study = Study()
-    assert all(frame.outcome is Outcome.OK for frame in study.watched(off_by(plan_of("a", "paper-6x6"), 0.9)))
-    told = study.told(Blank(), True)
-    assert (told.ok, told.reached, told.parts) == (True, (), {})
-    assert told.as_dict() == {"ok": True}
+    judge = Judge()
+    assert all(frame.outcome is Outcome.OK for frame in judge.judged(off_by(plan_of("a", "paper-6x6"), 0.9)))
+    assert judge.findings() == Findings((), True, {})
 
 
 def test_a_budget_takes_the_best_answer_that_is_left_time_for(dotwave) -> None:
@@ -125,10 +113,10 @@ def test_a_budget_takes_the_best_answer_that_is_left_time_for(dotwave) -> None:
 )
 def test_frames_are_late_when_the_clock_says_so(budget_s: float, late: int, rung: str, kept: str) -> None:
     seconds = itertools.count()
-    study = Study(asked_of(budget=f"{budget_s}s"), clock=lambda: float(next(seconds)))
-    frames = list(study.watched(plan_of("Hello there you all", "independent-6x6")))
+    judge = Judge(request_of(budget=f"{budget_s}s"), clock=lambda: float(next(seconds)))
+    frames = list(judge.judged(plan_of("Hello there you all", "independent-6x6")))
     assert [str(frame.outcome) for frame in frames] == ["ok"] * (4 - late) + ["out_of_budget"] * late
-    told = study.told(Blank(), True).reached
+    told = judge.findings().reached
     assert told[0] == "Planned in 5 s."
     assert told[1].startswith(f"Predicted by {rung} ")
     assert f"Budget {budget_s:g} s {kept}; by the clock" in told[-1]
@@ -170,6 +158,7 @@ def test_a_job_means_its_tolerance_as_the_option_does(dotwave, job: Path) -> Non
 
 
 def test_pictures_and_icons_are_held_to_a_tolerance(dotwave, tmp_path: Path) -> None:
+    assert json.loads(dotwave("image", HEART, "--json").out)["tolerance"] is None
     found = json.loads(dotwave("image", HEART, "--tol", "1e-6", "--json").out)
     assert found["tolerance"] == 1e-6
     assert "Predicted by static" in found["reached"][1]
@@ -223,41 +212,41 @@ def test_what_is_watched_of_a_long_scene_does_not_grow() -> None:
             watched += 1
             yield frame
 
-    study = Study(asked_of(tol="normal", explain=True))
-    for _ in study.watched(replace(plan, frames=many())):
+    judge = Judge(request_of(tol="normal", explain=True))
+    for _ in judge.judged(replace(plan, frames=many())):
         pass
     assert watched == 5000
-    assert len(study._frames) == 1
-    assert study.told(Blank(), True).ok
+    assert len(judge._frames) == 1
+    assert judge.findings().met
 
 
 @pytest.mark.parametrize("words", ["", "high", "0", "-1", "nan", "inf"])
 def test_tolerances_that_are_none(words: str) -> None:
     with pytest.raises(AppError, match="--tol: expected draft, normal, fine or a number above 0"):
-        asked_of(tol=words)
+        request_of(tol=words)
 
 
 @pytest.mark.parametrize(
     ("words", "frame"),
     [
-        ("3", FrameAsked(3)),
-        ("ways.png", FrameAsked(1, Path("ways.png"))),
-        ("2:a/b.svg", FrameAsked(2, Path("a/b.svg"))),
-        ("C:ways.png", FrameAsked(1, Path("C:ways.png"))),
+        ("3", FrameRequest(3)),
+        ("ways.png", FrameRequest(1, Path("ways.png"))),
+        ("2:a/b.svg", FrameRequest(2, Path("a/b.svg"))),
+        ("C:ways.png", FrameRequest(1, Path("C:ways.png"))),
     ],
 )
-def test_frames_to_be_traded(words: str, frame: FrameAsked) -> None:
-    assert frame_asked(words) == frame
+def test_frames_to_be_traded(words: str, frame: FrameRequest) -> None:
+    assert frame_request(words) == frame
 
 
 @pytest.mark.parametrize("words", ["0", "0:ways.png", "2:", "ways.gif", "two", ""])
 def test_frames_that_are_none(words: str) -> None:
     with pytest.raises(AppError, match=r"--pareto: expected a frame|expected a picture name"):
-        frame_asked(words)
+        frame_request(words)
 
 
 def test_a_blank_scene_needs_no_prediction() -> None:
     plan = plan_of("Hello", "paper-6x6")
-    study = Study(asked_of(tol="fine"))
-    list(study.watched(replace(plan, frames=plan_scene(Scene(GridShape(6, 6), ()), plan.device).frames)))
-    assert study.told(Blank(), True).reached[0].startswith("Planned in")
+    judge = Judge(request_of(tol="fine"))
+    list(judge.judged(replace(plan, frames=plan_scene(Scene(GridShape(6, 6), ()), plan.device).frames)))
+    assert judge.findings().reached[0].startswith("Planned in")

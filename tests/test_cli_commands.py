@@ -58,18 +58,23 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
     given = {}
 
-    def render(source, **others):
-        given.update(others, source=source)
+    def scene(source, device, options):
+        given.update(source=source.text, options=options)
+        return "scene"
+
+    def render(shown, device, out, request):
+        given.update(scene=shown, device=device, out=out, encoding=request.encoding)
         return BRIEF
 
-    stand_in("rendering.text", render_text=render)
+    stand_in("api.scenes", text=scene, device=lambda name: name)
+    stand_in("rendering.render", render=render)
     ended = dotwave(
         "text", "Hello", "-d", "linked-6x6", "-o", "x.wav", "--table", "language:de grade:2", "--undefined", "drop",
         "--cell-gap", 1, "--line-gap", 2, "--rate", 3.5, "--presentation", "by-row", "--dots", 6, "--blank-between",
         "--sample-format", "pcm24",
     )  # fmt: skip
     assert ended.code == 0
-    assert given["source"] == "Hello"
+    assert (given["source"], given["scene"]) == ("Hello", "scene")
     assert (given["device"], given["out"], given["encoding"]) == ("linked-6x6", Path("x.wav"), "pcm24")
     options = given["options"]
     assert options.table == "language:de grade:2"
@@ -81,14 +86,15 @@ def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
 
 def test_text_leaves_unsaid_options_to_the_encoder(dotwave, stand_in) -> None:
     given = {}
-    stand_in("rendering.text", render_text=lambda source, **others: given.update(others) or BRIEF)
+    stand_in("api.scenes", text=lambda _, device, options: given.update(options=options), device=lambda name: name)
+    stand_in("rendering.render", render=lambda *_: BRIEF)
     dotwave("text", "Hello")
     assert given["options"] == encoders.TextOptions()
 
 
 @pytest.mark.parametrize(("outcomes", "code"), [({"ok": 2}, 0), ({"ok": 1, "unreachable": 1}, 1)])
 def test_text_exit_code_and_json(dotwave, stand_in, outcomes, code) -> None:
-    stand_in("rendering.text", render_text=lambda *_, **__: replace(BRIEF, outcomes=outcomes, error=float("nan")))
+    stand_in("rendering.render", render=lambda *_: replace(BRIEF, outcomes=outcomes, error=float("nan")))
     ended = dotwave("text", "Hello", "--json")
     assert ended.code == code
     answer = json.loads(ended.out, parse_constant=pytest.fail)
@@ -99,7 +105,7 @@ def test_text_exit_code_and_json(dotwave, stand_in, outcomes, code) -> None:
 @pytest.mark.parametrize("options", [[], ["--json"]])
 def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options) -> None:
     sly = replace(BRIEF, undefined=("\x1b[2J named", "\x9b2J named"), notes=("\u2801 déjà\u00a0vu",))
-    stand_in("rendering.text", render_text=lambda *_, **__: sly)
+    stand_in("rendering.render", render=lambda *_: sly)
     out = dotwave("text", "Hello", *options).out
     assert "\x1b" not in out
     assert "\x9b" not in out
@@ -110,7 +116,7 @@ def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options)
 
 @pytest.mark.parametrize(("report", "code"), [(GOOD, 0), (BAD, 1), (replace(GOOD, text_equal=False), 1)])
 def test_verify_exit_code(dotwave, stand_in, report, code) -> None:
-    stand_in("verification", verify=lambda path: report)
+    stand_in("api.felt", verify=lambda path: report)
     assert dotwave("verify", "x.wav").code == code
     assert json.loads(dotwave("verify", "x.wav", "--json").out)["ok"] is (code == 0)
 
@@ -122,7 +128,7 @@ def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
     def fail(path: Path) -> VerifyReport:
         raise root(f"{path}: what is wrong\nand the cure")
 
-    stand_in("verification", verify=fail)
+    stand_in("api.felt", verify=fail)
     ended = dotwave("verify", "x.wav")
     assert (ended.code, ended.out, ended.err) == (2, "", "dotwave: x.wav: what is wrong and the cure\n")
 
@@ -131,7 +137,7 @@ def test_ctrl_c_is_130(dotwave, stand_in) -> None:
     def interrupt(path: Path) -> VerifyReport:
         raise KeyboardInterrupt
 
-    stand_in("verification", verify=interrupt)
+    stand_in("api.felt", verify=interrupt)
     assert dotwave("verify", "x.wav").code == 130
 
 

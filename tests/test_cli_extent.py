@@ -14,7 +14,8 @@ import pytest
 from chainsim import load_device
 from dotwave.rendering import extent
 from dotwave.rendering.extent import extent_of
-from dotwave.rendering.text import render_text
+from dotwave.rendering.render import render
+from dotwave.request import Request
 from encoders import GridShape, Presentation, TextOptions, encode_text
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -29,7 +30,7 @@ def test_the_size_that_is_said_is_that_of_the_file(tmp_path: Path, device: str, 
     profile = load_device(device)
     scene = encode_text(TEXT, GridShape(profile.rows, profile.cols), options)
     said = extent_of(scene.frames, profile, out, encoding)
-    report = render_text(TEXT, device=device, out=out, options=options, encoding=encoding)
+    report = render(scene, profile, out, Request(encoding=encoding))
     size = out.stat().st_size
     assert said.seconds == pytest.approx(report.duration_s, rel=0.1)
     if name == "x.csv":

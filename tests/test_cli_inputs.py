@@ -13,7 +13,7 @@ import pytest
 from chainsim import ProfileError, read_model
 from chainsim.model.device import Device
 from drivers import FileError
-from drivers.formats.samples import check_suffix
+from drivers.formats.table import check_suffix
 from encoders import TextSource, UnsupportedSource
 from encoders.braille.readers import sources
 

@@ -16,7 +16,7 @@ from chainsim import ProfileError, simulate
 from dotwave.errors import AppError
 from dotwave.figures.sweep_map import draw_map
 from dotwave.studies.sweep import FIELDS, run_sweep
-from dotwave.studies.sweep_files import Parts
+from dotwave.studies.sweep_files import SweepParts
 from drivers import FileError
 
 TEXT = """\
@@ -140,7 +140,7 @@ def test_parts_of_another_sweep_are_refused(source, tmp_path, monkeypatch):
 def test_one_part_is_read_at_a_time(tmp_path):
     for first in (0, 2):
         np.savez(tmp_path / f"{first:012d}.npz", a=np.array([first, first + 1]))
-    parts = Parts(tmp_path, range(0, 4, 2)).field("a")
+    parts = SweepParts(tmp_path, range(0, 4, 2)).field("a")
     assert next(parts).tolist() == [0, 1]
     (tmp_path / "000000000002.npz").unlink()
     with pytest.raises(FileNotFoundError):

@@ -227,12 +227,12 @@ def test_a_damaged_piece_is_solved_again(
 def test_any_flipped_bit_is_noticed(
     source: Path, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dotwave.studies.sweep_files import Parts
+    from dotwave.studies.sweep_files import SweepParts
 
     out = tmp_path / "out.npz"
     parts = stopped(source, out, monkeypatch)
     sweep = json.loads((parts / "sweep.json").read_text())["sweep"]
-    stored, path = Parts(parts, range(0, 20, 3), sweep), parts / "000000000000.npz"
+    stored, path = SweepParts(parts, range(0, 20, 3), sweep), parts / "000000000000.npz"
     raw = path.read_bytes()
     assert stored.done(0)
     generator, noticed = random.Random(1), 0

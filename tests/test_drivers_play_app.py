@@ -19,7 +19,16 @@ from chainsim import load_device
 from dotwave.errors import AppError
 from dotwave.playing.emulate import EmulateReport, dots_as_braille, emulate, parse_window
 from dotwave.playing.play import list_ports, play
-from drivers import BoardEmulator, BoardRefusal, Faults, Firmware, StreamReport, Window, read_waveform, write_waveform
+from drivers import (
+    BoardEmulator,
+    BoardRefusal,
+    Faults,
+    FaultWindow,
+    Firmware,
+    StreamReport,
+    read_waveform,
+    write_waveform,
+)
 from drivers.protocol.pty_line import PtyLine
 from drivers.sinks.controller import buffer_notes
 from encoders import GridShape, TextOptions, TextSource, encode_text
@@ -166,7 +175,7 @@ def test_the_emulator_draws_over_itself(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_windows_are_two_numbers() -> None:
-    assert parse_window("3,2", "stall") == Window(3.0, 2.0)
+    assert parse_window("3,2", "stall") == FaultWindow(3.0, 2.0)
     assert parse_window(None, "stall") is None
     for text in ("3", "a,b", "1,2,3", "-1,2", "1,inf", "nan,1"):
         with pytest.raises(AppError, match="--stall"):

@@ -19,7 +19,7 @@ import pytest
 from chainsim import Device, Outcome, load_device
 from drivers import read_waveform, write_waveform
 from drivers.protocol.emulator import LONGEST_STEP_S, Emulator
-from drivers.protocol.faults import Faults, Window
+from drivers.protocol.faults import Faults, FaultWindow
 from drivers.protocol.host_session import HostSession, StreamReport, Timing
 from drivers.protocol.messages import FULL_CODE
 from drivers.protocol.outgoing import session_messages
@@ -177,7 +177,7 @@ def test_a_bad_line_and_a_pulled_cable(tmp_path: Path) -> None:
     device, clock = load_device("paper-6x6"), SharedClock()
     sent, arrived, link = tmp_path / "sent.wav", tmp_path / "arrived.wav", tmp_path / "port"
     write_waveform(plan_of(device, 5, 0.4), sent)
-    faults = Faults(drop=0.01, corrupt=0.01, disconnect=Window(0.8, 0.7))
+    faults = Faults(drop=0.01, corrupt=0.01, disconnect=FaultWindow(0.8, 0.7))
     with emulated(device, clock, record=arrived, link=link, faults=faults) as emulator:
         report = play_to(str(link), sent, clock)
         assert emulator.status().mischief > 0
@@ -192,7 +192,7 @@ def test_the_cable_stays_out(tmp_path: Path) -> None:
     sent, link = tmp_path / "sent.wav", tmp_path / "port"
     write_waveform(plan_of(device, 3, 0.25), sent)
     blocks: list[OutputBlock] = []
-    cut = Faults(disconnect=Window(0.6, 99.0))
+    cut = Faults(disconnect=FaultWindow(0.6, 99.0))
     with (
         emulated(device, clock, link=link, faults=cut, on_output=blocks.append),
         pytest.raises(NoAnswer, match="check port and cable"),
@@ -314,7 +314,7 @@ def test_links_that_change_leave_the_store_full(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seconds", "faults"),
-    [(60.0, Faults()), (10.0, Faults(drop=0.01, corrupt=0.01, disconnect=Window(4.0, 2.0)))],
+    [(60.0, Faults()), (10.0, Faults(drop=0.01, corrupt=0.01, disconnect=FaultWindow(4.0, 2.0)))],
     ids=["clean", "bad"],
 )
 def test_a_minute_of_42_channels(tmp_path: Path, seconds: float, faults: Faults) -> None:

@@ -27,11 +27,11 @@ from drivers.protocol.messages import (
     Mark,
     Marked,
     Refused,
-    Samples,
-    Start,
+    SamplesMessage,
+    StartMessage,
     State,
-    Tone,
     Tones,
+    WireTone,
 )
 from drivers.protocol.packet import (
     LONGEST_FRAME,
@@ -144,7 +144,7 @@ def test_a_payload_of_another_length_is_refused(kind: Kind) -> None:
 def test_every_message_comes_back_from_its_bytes() -> None:
     found = Capabilities(1, 6, 6, 42, 8000, 16, 4000, 256, 4096, 100.0, 0.5, 1.0, 200, 50, 9, 3, "ä board")
     ack = Ack(9, 4, 2**40, 5, 2**33, 2**33 - 1, State.PLAYING, Flag.GAP, 1, 2, 3, 2**50)
-    tones = Tones(5, 1, 9, (Tone(1.5, 133.0, 0.25), Tone(0.5, 266.0, -1.0)))
+    tones = Tones(5, 1, 9, (WireTone(1.5, 133.0, 0.25), WireTone(0.5, 266.0, -1.0)))
     assert Capabilities.of(found.packet()) == found
     assert Ack.of(ack.packet()) == ack
     for kept in (0, 1, 2**32 - 1):
@@ -155,7 +155,7 @@ def test_every_message_comes_back_from_its_bytes() -> None:
     assert Marked.of(Marked(3, 2**40, 2**50).packet()) == Marked(3, 2**40, 2**50)
     assert Refused.of(Refused(8, "nö").packet()) == Refused(8, "nö")
     for message in (
-        Start(9, True, 8000, 2**40, b"note"),
+        StartMessage(9, True, 8000, 2**40, b"note"),
         LinkCoupling(2**40, 5, 100, (0, 65535, 3)),
         Bias(7, 41, 3, -12.5),
         tones,
@@ -163,13 +163,13 @@ def test_every_message_comes_back_from_its_bytes() -> None:
     ):
         assert type(message).of(message.packet(77)) == message
         assert message.packet(77).number == 77
-    samples = Samples(2**40, np.array([[1, -2], [32767, -32767]], dtype=np.int16))
-    back = Samples.of(samples.packet(1), 2)
+    samples = SamplesMessage(2**40, np.array([[1, -2], [32767, -32767]], dtype=np.int16))
+    back = SamplesMessage.of(samples.packet(1), 2)
     assert back is not None
     assert back.first == samples.first
     np.testing.assert_array_equal(back.codes, samples.codes)
-    assert Samples.of(samples.packet(1), 3) is None
-    full = Samples(0, np.zeros((Samples.most(42, MAX_PAYLOAD), 42), dtype=np.int16))
+    assert SamplesMessage.of(samples.packet(1), 3) is None
+    full = SamplesMessage(0, np.zeros((SamplesMessage.most(42, MAX_PAYLOAD), 42), dtype=np.int16))
     assert MAX_PAYLOAD - 84 < len(full.packet(0).payload) <= MAX_PAYLOAD
 
 

@@ -26,8 +26,8 @@ from drivers.protocol.messages import (
     LinkCoupling,
     Mark,
     Marked,
-    Samples,
-    Start,
+    SamplesMessage,
+    StartMessage,
     State,
 )
 from drivers.protocol.outgoing import End, Message
@@ -52,12 +52,12 @@ def codes_of(seconds: float, seed: int, spec: ControllerSpec = SPEC) -> np.ndarr
 
 
 def stream(codes: np.ndarray, marks: list[int], _: Capabilities) -> Iterator[Message]:
-    yield Start(7, False, SPEC.rate_hz, len(codes))
+    yield StartMessage(7, False, SPEC.rate_hz, len(codes))
     for first in range(0, len(codes), 48):
         for number, at in enumerate(marks):
             if first <= at < first + 48:
                 yield Mark(at, number)
-        yield Samples(first, codes[first : first + 48])
+        yield SamplesMessage(first, codes[first : first + 48])
     yield End(len(codes))
 
 
@@ -67,7 +67,7 @@ class Kept:
 
     blocks: list[np.ndarray] = field(default_factory=list)
 
-    def start(self, start: Start) -> None:
+    def start(self, start: StartMessage) -> None:
         pass
 
     def samples(self, codes: np.ndarray) -> None:
@@ -178,7 +178,12 @@ def test_a_long_line_is_not_taken_for_a_broken_one() -> None:
 
 def greeted(version: int, **options: int) -> VirtualController:
     controller = VirtualController(replace(SPEC, **options), now=0.0, recorder=Kept())  # type: ignore[arg-type]
-    send(controller, 0.0, Packet(Kind.HELLO, 0, version.to_bytes(2, "little")), Start(7, False, 8000, 8000).packet(0))
+    send(
+        controller,
+        0.0,
+        Packet(Kind.HELLO, 0, version.to_bytes(2, "little")),
+        StartMessage(7, False, 8000, 8000).packet(0),
+    )
     return controller
 
 
@@ -190,7 +195,7 @@ def acks(answers: list[Packet]) -> Ack:
 
 def block(number: int) -> Packet:
     """Sample `number` - 1 of the session, alone in its packet."""
-    return Samples(number - 1, np.full((1, 2), number, dtype=np.int16)).packet(number)
+    return SamplesMessage(number - 1, np.full((1, 2), number, dtype=np.int16)).packet(number)
 
 
 def test_early_packets_wait_for_their_turn_and_are_told() -> None:
@@ -225,7 +230,7 @@ def test_what_was_kept_does_not_outlive_its_session(end: str) -> None:
         controller.receive(STOP, 0.0)
     elif end == "refused":
         send(controller, 0.0, LinkCoupling(0, 99, 0, (1, 1)).packet(1))
-    send(controller, 0.0, Start(8, False, 8000, 8000).packet(0))
+    send(controller, 0.0, StartMessage(8, False, 8000, 8000).packet(0))
     ack = acks(send(controller, 0.0, block(1)))
     assert (ack.session, ack.next_number, ack.kept, ack.received) == (8, 2, 0, 1)
 
@@ -271,14 +276,14 @@ class OldController:
                 )  # fmt: skip
                 self.out += encode(numbers.packet())
             elif packet.kind is Kind.START and packet.number == 0:
-                self.session, self.next = self.session or Start.of(packet).session, max(self.next, 1)
+                self.session, self.next = self.session or StartMessage.of(packet).session, max(self.next, 1)
             elif packet.kind in (Kind.SAMPLES, Kind.END, Kind.MARK):
                 self.gap = self.gap or packet.number > self.next
                 if packet.number == self.next:
                     self.next += 1
                     self.ended = packet.kind is Kind.END
                     if packet.kind is Kind.SAMPLES:
-                        samples = Samples.of(packet, SPEC.channels)
+                        samples = SamplesMessage.of(packet, SPEC.channels)
                         assert samples is not None
                         self.codes.append(samples.codes)
                     elif packet.kind is Kind.MARK:
@@ -345,7 +350,7 @@ class OldHost:
         while self.at < min(self.base + 32, len(self.wires)):
             message = self.messages[self.at]
             room = 0 if self.ack is None else self.ack.accept_samples
-            if isinstance(message, Samples) and message.first + len(message.codes) > room:
+            if isinstance(message, SamplesMessage) and message.first + len(message.codes) > room:
                 break
             out += self.wires[self.at]
             self.at += 1

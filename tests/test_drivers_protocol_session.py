@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from drivers.protocol.faults import Faults, FaultyLine, Window
+from drivers.protocol.faults import Faults, FaultWindow, FaultyLine
 from drivers.protocol.host_session import STOP, ControllerRefused, HostSession, SessionLost, Timing
 from drivers.protocol.messages import (
     FULL_CODE,
@@ -17,11 +17,11 @@ from drivers.protocol.messages import (
     Capabilities,
     LinkCoupling,
     Mark,
-    Samples,
-    Start,
+    SamplesMessage,
+    StartMessage,
     State,
-    Tone,
     Tones,
+    WireTone,
 )
 from drivers.protocol.outgoing import End, Message
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
@@ -39,12 +39,12 @@ SPEC = ControllerSpec(
 class Kept:
     """A recorder that keeps everything."""
 
-    starts: list[Start] = field(default_factory=list)
+    starts: list[StartMessage] = field(default_factory=list)
     blocks: list[np.ndarray] = field(default_factory=list)
     events: list[object] = field(default_factory=list)
     ends: int = 0
 
-    def start(self, start: Start) -> None:
+    def start(self, start: StartMessage) -> None:
         self.starts.append(start)
 
     def samples(self, codes: np.ndarray) -> None:
@@ -66,12 +66,12 @@ def codes_of(seconds: float, seed: int = 1) -> np.ndarray:
 
 
 def stream(codes: np.ndarray, marks: list[int], _: Capabilities) -> Iterator[Message]:
-    yield Start(7, False, SPEC.rate_hz, len(codes))
+    yield StartMessage(7, False, SPEC.rate_hz, len(codes))
     for first in range(0, len(codes), 48):
         for number, at in enumerate(marks):
             if first <= at < first + 48:
                 yield Mark(at, number)
-        yield Samples(first, codes[first : first + 48])
+        yield SamplesMessage(first, codes[first : first + 48])
     yield End(len(codes))
 
 
@@ -147,8 +147,8 @@ def test_the_controllers_clock_sets_the_pace(drift_ppm: float) -> None:
         Faults(drop=0.01, corrupt=0.01),
         Faults(drop=0.1, corrupt=0.1, duplicate=0.1),
         Faults(delay_s=0.03, duplicate=0.5),
-        Faults(drop=0.01, corrupt=0.01, disconnect=Window(0.8, 2.0)),
-        Faults(stall=Window(0.5, 1.0)),
+        Faults(drop=0.01, corrupt=0.01, disconnect=FaultWindow(0.8, 2.0)),
+        Faults(stall=FaultWindow(0.5, 1.0)),
     ],
     ids=["one-percent", "bad", "late", "cut", "stall"],
 )
@@ -169,7 +169,7 @@ def test_nothing_is_lost_and_nothing_comes_twice(faults: Faults, seed: int) -> N
 @pytest.mark.parametrize("reopened", [False, True])
 def test_the_cable_is_pulled_at_every_stage(start_s: float, reopened: bool) -> None:
     codes, length_s = codes_of(2.0), 0.6
-    bench = Bench(partial(stream, codes, [0, 8000]), faults=Faults(disconnect=Window(start_s, length_s)))
+    bench = Bench(partial(stream, codes, [0, 8000]), faults=Faults(disconnect=FaultWindow(start_s, length_s)))
     while bench.now < 100.0 + start_s + length_s:
         bench.step()
         if bench.now > 100.0 + start_s + SPEC.watchdog_s + STEP_S:
@@ -204,7 +204,7 @@ def test_the_silent_host_is_ramped_to_zero_within_the_watchdog_time() -> None:
 
 def test_after_a_silence_the_stream_goes_on_where_it_stopped() -> None:
     codes = codes_of(2.0)
-    bench = Bench(partial(stream, codes, []), faults=Faults(disconnect=Window(0.6, 0.7)))
+    bench = Bench(partial(stream, codes, []), faults=Faults(disconnect=FaultWindow(0.6, 0.7)))
     bench.run(6.0)
     whole = bench.played() * (FULL_CODE / 100.0)
     assert len(whole) == len(codes)
@@ -279,16 +279,16 @@ def send(controller: VirtualController, now: float, *packets: Packet) -> list[Pa
 @pytest.mark.parametrize(
     "message",
     [
-        Samples(5, np.zeros((4, 2), dtype=np.int16)),
-        Samples(0, np.zeros((2001, 1), dtype=np.int16)),
-        Samples(0, np.full((1, 2), -32768, dtype=np.int16)),
+        SamplesMessage(5, np.zeros((4, 2), dtype=np.int16)),
+        SamplesMessage(0, np.zeros((2001, 1), dtype=np.int16)),
+        SamplesMessage(0, np.full((1, 2), -32768, dtype=np.int16)),
         LinkCoupling(0, 2, 0, (1, 1)),
         LinkCoupling(0, 0, 0, (1, 1, 1)),
         Bias(0, 2, 0, 1.0),
         Bias(0, 0, 0, 101.0),
         Bias(0, 0, 0, float("nan")),
-        Tones(0, 0, 0, (Tone(60.0, 100.0, 0.0), Tone(60.0, 120.0, 0.0))),
-        Tones(0, 0, 0, (Tone(1.0, float("inf"), 0.0),)),
+        Tones(0, 0, 0, (WireTone(60.0, 100.0, 0.0), WireTone(60.0, 120.0, 0.0))),
+        Tones(0, 0, 0, (WireTone(1.0, float("inf"), 0.0),)),
         End(3),
     ],
     ids=str,
@@ -297,9 +297,9 @@ def test_what_cannot_be_carried_out_is_refused_and_the_output_stays_zero(message
     blocks: list[OutputBlock] = []
     kept = Kept()
     controller = VirtualController(SPEC, now=0.0, on_output=blocks.append, recorder=kept)
-    answers = send(controller, 0.0, Start(7, False, 8000, 8000).packet(0), message.packet(1))
+    answers = send(controller, 0.0, StartMessage(7, False, 8000, 8000).packet(0), message.packet(1))
     assert Kind.REFUSED in {packet.kind for packet in answers}
-    answers = send(controller, 0.1, End(8000).packet(2), Samples(0, np.ones((9, 2), dtype=np.int16)).packet(1))
+    answers = send(controller, 0.1, End(8000).packet(2), SamplesMessage(0, np.ones((9, 2), dtype=np.int16)).packet(1))
     assert Kind.REFUSED in {packet.kind for packet in answers}
     controller.tick(1.0)
     assert not any(block.volts.any() for block in blocks)
@@ -309,7 +309,7 @@ def test_what_cannot_be_carried_out_is_refused_and_the_output_stays_zero(message
 
 def test_the_host_says_what_was_refused() -> None:
     def wrong(_: Capabilities) -> Iterator[Message]:
-        yield Start(7, False, 48000, 10)
+        yield StartMessage(7, False, 48000, 10)
 
     bench = Bench(wrong)
     with pytest.raises(ControllerRefused, match="8000 Hz, not 48000"):
@@ -353,8 +353,8 @@ def test_coupling_glides_and_holds() -> None:
 
 def test_parametric_tones_and_bias() -> None:
     def tones(_: Capabilities) -> Iterator[Message]:
-        yield Start(7, True, 8000, 4000)
-        yield Tones(0, 0, 800, (Tone(10.0, 125.0, 0.5), Tone(5.0, 250.0, 0.0)))
+        yield StartMessage(7, True, 8000, 4000)
+        yield Tones(0, 0, 800, (WireTone(10.0, 125.0, 0.5), WireTone(5.0, 250.0, 0.0)))
         yield Bias(1000, 1, 1000, 30.0)
         yield Tones(2000, 0, 0, ())
         yield End(4000)
@@ -379,7 +379,7 @@ def test_a_second_session_follows_the_first() -> None:
 
     def another(found: Capabilities) -> Iterator[Message]:
         for message in stream(second, [], found):
-            yield replace(message, session=8) if isinstance(message, Start) else message
+            yield replace(message, session=8) if isinstance(message, StartMessage) else message
 
     bench.session = HostSession(another, session=8, timing=Timing())
     bench.session.connected()

@@ -21,7 +21,7 @@ from dotwave.playing.emulate import emulate
 from dotwave.verification import verify
 from drivers import read_waveform, write_waveform
 from drivers.protocol.emulator import Emulator
-from drivers.protocol.messages import FULL_CODE, Samples, Start
+from drivers.protocol.messages import FULL_CODE, SamplesMessage, StartMessage
 from drivers.protocol.outgoing import End, Message, session_messages
 from drivers.protocol.playout import ControllerSpec
 from drivers.protocol.record import ArrivalRecorder, CutShort
@@ -51,9 +51,9 @@ def messages(path: Path, device: Device = DEVICE) -> Iterator[Message]:
 
 def take(recorder: ArrivalRecorder, messages: Iterator[Message]) -> None:
     for message in messages:
-        if isinstance(message, Start):
+        if isinstance(message, StartMessage):
             recorder.start(message)
-        elif isinstance(message, Samples):
+        elif isinstance(message, SamplesMessage):
             recorder.samples(message.codes)
         elif isinstance(message, End):
             recorder.end()
@@ -64,7 +64,7 @@ def take(recorder: ArrivalRecorder, messages: Iterator[Message]) -> None:
 def until(path: Path, time_s: float) -> Iterator[Message]:
     """The messages of a session before the samples at a time."""
     first = time_s * DEVICE.amplifier.rate_hz
-    return takewhile(lambda message: not isinstance(message, Samples) or message.first < first, messages(path))
+    return takewhile(lambda message: not isinstance(message, SamplesMessage) or message.first < first, messages(path))
 
 
 def codes(path: Path) -> np.ndarray:

@@ -109,6 +109,24 @@ def test_tools_are_installed_for_the_tests_only(house: House) -> None:
     assert len(house.called("pip")) == 2
 
 
+def test_the_notebook_is_made_of_the_tutorial_and_opened(house: House) -> None:
+    assert house.run("notebook").returncode == 0
+    assert ".[notebook]" in house.called("pip")[0]
+    made, opened = house.called("tool")
+    assert made == "tool jupytext -m jupytext --quiet --to notebook --output out/tutorial.ipynb docs/tutorial.py"
+    assert opened == "tool jupyterlab -m jupyterlab out/tutorial.ipynb"
+    house.run("dotwave", "doctor")
+    assert len(house.called("pip")) == 1
+
+
+def test_a_notebook_that_cannot_be_made_is_said(house: House) -> None:
+    house.stand_in(failing="jupytext")
+    ended = house.run("notebook")
+    assert ended.returncode == 1
+    assert "jupytext could not make the notebook" in ended.stderr
+    assert [line.split()[1] for line in house.called("tool")] == ["jupytext"]
+
+
 def test_arguments_folder_and_exit_code_pass_through(house: House, tmp_path: Path) -> None:
     house.stand_in(code=7)
     elsewhere = tmp_path / "else where"

@@ -10,9 +10,11 @@ import pytest
 from PIL import Image
 
 from chainsim import load_device
+from dotwave.api.scenes import device as device_of, image as image_scene
+from dotwave.cli.options import picture_options
 from dotwave.errors import AppError
-from dotwave.rendering.image import picture_options, render_images
-from dotwave.rendering.scene import Rendering, render_job
+from dotwave.rendering.render import render, render_job
+from dotwave.rendering.steps import write_steps
 from dotwave.verification import verify
 from encoders import EncodeError, GridShape, PictureOptions, encode_picture
 
@@ -108,12 +110,12 @@ def test_the_tolerance_decides_what_is_ok(tmp_path: Path, monkeypatch: pytest.Mo
         (0.2, set()),
     ):
         for name in ("draft", "normal", "fine"):
-            from dotwave.rendering import scene as render
+            from dotwave.rendering import render as module
 
-            plain = render.plan_scene
-            monkeypatch.setattr(render, "plan_scene", lambda *a, e=error, p=plain, **k: off_by(p(*a, **k), e))
+            plain = module.plan_scene
+            monkeypatch.setattr(module, "plan_scene", lambda *a, e=error, p=plain, **k: off_by(p(*a, **k), e))
             assert render_job(job(tmp_path, text.format(name))).ok == (name in good)
-            monkeypatch.setattr(render, "plan_scene", plain)
+            monkeypatch.setattr(module, "plan_scene", plain)
 
 
 def off_by(plan, error):
@@ -145,13 +147,14 @@ def test_errors_name_the_item(tmp_path: Path) -> None:
 
 def test_images_one_after_another_with_every_step(tmp_path: Path) -> None:
     files = [HEART, SAMPLES / "icons" / "play.svg"]
-    how = Rendering(tmp_path / "two.wav")
-    report = render_images(files, device="paper-6x6", options=PictureOptions(), how=how, explain=tmp_path / "steps")
+    device = device_of("paper-6x6")
+    written = write_steps(files, device, PictureOptions(), tmp_path / "steps")
+    report = render(image_scene(files, device), device, tmp_path / "two.wav")
     assert report.ok
     assert verify(tmp_path / "two.wav").ok
     steps = sorted((tmp_path / "steps").iterdir())
     assert {path.name.split("-")[0] for path in steps} == {"1", "2"}
-    assert sorted(report.files[2:]) == [str(path) for path in steps]
+    assert sorted(written) == [str(path) for path in steps]
     last = np.asarray(Image.open(next(path for path in steps if "1-heart" in path.name and "on-off" in path.name)))
     side = last.shape[0] // 6
     dots = last[side // 2 :: side, side // 2 :: side] > 128
@@ -160,7 +163,7 @@ def test_images_one_after_another_with_every_step(tmp_path: Path) -> None:
 
 def test_the_pitch_is_that_of_the_device(tmp_path: Path) -> None:
     device = load_device("linked-40x96")
-    report = render_images([HEART], device="linked-40x96", options=PictureOptions(), how=Rendering())
+    report = render(image_scene(HEART, device), device)
     options = PictureOptions(pitch_m=(device.pitch_m, device.pitch_m))
     expected = encode_picture(HEART, GridShape(40, 96), options).report.similarity
     assert report.parts == (f"icon: heart.svg, similarity {expected:.2f}",)

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from chainsim import Device, load_device
 from chainsim.model.calibrated import Actuator
-from dotwave.rendering.text import render_text
+from dotwave.api.scenes import device as device_of, text as text_scene
+from dotwave.rendering.render import render
 from dotwave.reports.text import VerifyReport
 from dotwave.studies.calibrate import calibrate
 from dotwave.studies.measured_sweeps import COLUMNS
 from dotwave.verification import verify
 from drivers import write_waveform
-from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
+from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
 from planner.robustness.batch_march import Parts, march
 
@@ -91,7 +92,8 @@ class Real:
 
 def felt_on(real: Device, planned_for: str, out: Path) -> VerifyReport:
     """What "Hi", planned for one device, makes felt on another."""
-    report = render_text("Hi", device=planned_for, out=out, options=TextOptions(), encoding="float32")
+    profile = device_of(planned_for)
+    report = render(text_scene("Hi", profile), profile, out)
     assert report.ok, report.as_text()
     manifest = out.with_suffix(".json")
     told = json.loads(manifest.read_text(encoding="utf-8"))

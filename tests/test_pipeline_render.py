@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.io import wavfile
 
 from chainsim import load_device
-from dotwave.rendering.text import render_text
+from dotwave.api.scenes import device as device_of, text as text_scene
+from dotwave.rendering.render import render
 from dotwave.verification import verify
 from drivers import UnreadableWaveform, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions
@@ -27,7 +28,9 @@ def own_cache(tmp_path, monkeypatch):
 
 def rendered(tmp_path, text, device, **options):
     out = tmp_path / "x.wav"
-    report = render_text(text, device=device, out=out, options=TextOptions(**options), encoding="float32")
+    profile = device_of(device)
+    source = Path(text) if text.endswith(".txt") else text
+    report = render(text_scene(source, profile, TextOptions(**options)), profile, out)
     return report, out
 
 

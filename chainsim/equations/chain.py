@@ -56,6 +56,12 @@ class Chain:
     ------
     ValueError
         With the field and its value when one is out of range.
+
+    Examples
+    --------
+    >>> from chainsim import Chain
+    >>> Chain(n=6, delta=5.3006e-3, beta=-1.0).cols
+    6
     """
 
     n: int
@@ -168,6 +174,13 @@ class Setting:
         None for a chain.
 
     Build one with `Setting.of`, which broadcasts and checks.
+
+    Examples
+    --------
+    >>> from chainsim import Chain, Setting
+    >>> setting = Setting.of(Chain(n=3, delta=0.005, beta=-1.0), epsilon=[1e-4, 2e-4], lam=0.006, omega=1.0)
+    >>> len(setting), setting.lam.shape
+    (2, (2, 3))
     """
 
     epsilon: Floats

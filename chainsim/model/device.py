@@ -129,6 +129,15 @@ class Device(_Part):
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
         lam: 0.0}`` (relative standard deviations). Plans then minimise the expected error. None: they are as they say.
     notes : field name -> where the value comes from.
+
+    Examples
+    --------
+    >>> from chainsim import load_device
+    >>> device = load_device("linked-6x6")
+    >>> device
+    Device('linked-6x6', 6 x 6)
+    >>> device.amplifier.rate_hz, device.chains_per_row
+    (24000, 1)
     """
 
     schema_: Literal["dotwave/device/1"] = Field("dotwave/device/1", alias="schema")
@@ -174,6 +183,9 @@ class Device(_Part):
                 f"full_scale {self.full_scale} is beyond the softening hilltop {self.escape_amplitude:.4g}"
             )
         return self
+
+    def __repr__(self) -> str:
+        return f"Device({self.name!r}, {self.rows} x {self.cols})"
 
     @property
     def chains_per_row(self) -> int:

@@ -12,7 +12,14 @@ __all__ = ["Branch", "Outcome", "Response", "Stats"]
 
 
 class Outcome(StrEnum):
-    """How a solve or a plan ended. `sentence` says it to a person."""
+    """How a solve or a plan ended. `sentence` says it to a person.
+
+    Examples
+    --------
+    >>> from chainsim import Outcome
+    >>> Outcome("unreachable").sentence
+    'This device cannot make this pattern; the nearest it can make is given.'
+    """
 
     OK = "ok"
     ESCAPED = "escaped"

@@ -21,12 +21,14 @@ from typing import Annotated, NoReturn
 import typer
 from typer.main import get_command_name
 
+from encoders import Presentation, Undefined
+
 from ..errors import Terminated
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
+from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
 from .completion import completed_devices, completed_files, completed_texts
 from .ending import ended
 from .help import LOOK, RENDER, SET_UP, STUDY, Commands
-from .options import Dots, Presentation, SampleFormat, Undefined
+from .options import Dots, SampleFormat
 
 __all__ = ["app", "application", "main"]
 
@@ -78,9 +80,7 @@ def text(
     contrast: Annotated[
         float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
     ] = 20.0,
-    actuator: Annotated[
-        str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
-    ] = None,
+    actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
@@ -99,22 +99,23 @@ def text(
     Example:
       dotwave text "Hello world" --device linked-6x6 -o hello.wav
     """
-    from ..rendering.text import render_text
-    from ..request import asked_of
-    from ..studies.study import Study
+    from ..api.scenes import device as device_of, text as text_scene
+    from ..rendering.render import render
+    from ..request import request_of
+    from ..source import text_source
     from .options import place_of, text_options
 
-    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
+    request = request_of(
+        tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, encoding=sample_format.value,
+        actuator=place_of(actuator), yes=yes,
+    )  # fmt: skip
     options = text_options(
         table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
         presentation=presentation, dots=dots, blank_between=blank_between,
     )  # fmt: skip
-    report = render_text(
-        source, device=device, out=output, options=options, encoding=sample_format.value,
-        contrast_db=contrast, actuator=place_of(actuator), study=study, yes=yes,
-    )  # fmt: skip
-    told = study.told(report, report.ok)
-    _finish(told, as_json, ok=told.ok)
+    profile = device_of(device)
+    report = render(text_scene(text_source(source), profile, options), profile, output, request)
+    _finish(report, as_json, ok=report.ok)
 
 
 @app.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
@@ -158,7 +159,7 @@ def verify(out: Written, as_json: Json = False) -> None:
     Example:
       dotwave verify hello.wav
     """
-    from ..verification import verify as check
+    from ..api.felt import verify as check
 
     report = check(Path(out))
     _finish(report, as_json, ok=report.ok)
@@ -181,8 +182,8 @@ def preview(
     Example:
       dotwave preview hello.wav
     """
+    from ..api.felt import verify as check
     from ..figures.preview import write_preview
-    from ..verification import verify as check
 
     report = write_preview(check(Path(out)), output or Path(out).with_suffix(".preview"))
     _finish(report, as_json, ok=True)

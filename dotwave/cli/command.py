@@ -7,13 +7,15 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from drivers import SUFFIXES
+
 from ..errors import AppError
 from ..plain import printable
-from ..reports.report import Report
+from ..reports.printable import Printable
 from .completion import completed_devices, completed_files
 
 __all__ = [
-    "Budget", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "finish", "printable", "say",
+    "Actuator", "Budget", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "finish", "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -31,7 +33,7 @@ Written = Annotated[
     typer.Argument(
         metavar="OUT",
         help="A waveform written by `dotwave text` (.wav or .json).",
-        autocompletion=completed_files(".wav", ".npz", ".csv", ".raw", ".json"),
+        autocompletion=completed_files(*SUFFIXES, ".json"),
     ),
 ]
 Tol = Annotated[
@@ -41,6 +43,9 @@ Tol = Annotated[
 Budget = Annotated[
     str | None, typer.Option(help="Time for planning, such as 50ms or 2s; says how exact the answer is.")
 ]
+Actuator = Annotated[
+    str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
+]
 Explain = Annotated[bool, typer.Option("--explain", help="Also list which terms of the model are needed, and why.")]
 Pareto = Annotated[
     str | None,
@@ -49,7 +54,7 @@ Pareto = Annotated[
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a file of more than 1 GB.")]
 
 
-def finish(report: Report, as_json: bool, *, ok: bool) -> NoReturn:
+def finish(report: Printable, as_json: bool, *, ok: bool) -> NoReturn:
     """Print a report, as JSON or as text, and end with exit code 0 or 1."""
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
     say(shown)

@@ -1,4 +1,4 @@
-"""The choices of `dotwave text`, spelled once for the command line."""
+"""The choices of `dotwave text` and `dotwave image`, as the command line gives them."""
 
 from __future__ import annotations
 
@@ -9,25 +9,9 @@ from typing import TYPE_CHECKING, Any
 from ..errors import AppError
 
 if TYPE_CHECKING:
-    from encoders import TextOptions
+    from encoders import PictureOptions, TextOptions
 
-__all__ = ["Dots", "Presentation", "SampleFormat", "Undefined", "place_of", "text_options"]
-
-
-class Undefined(StrEnum):
-    """What to do with a character the table cannot write (`encoders.Undefined`, light to import)."""
-
-    NAME = "name"
-    DROP = "drop"
-    ERROR = "error"
-
-
-class Presentation(StrEnum):
-    """How the dots of a page are shown (`encoders.Presentation`, light to import)."""
-
-    TOGETHER = "together"
-    BY_ROW = "by-row"
-    BY_DOT = "by-dot"
+__all__ = ["Dots", "SampleFormat", "picture_options", "place_of", "text_options"]
 
 
 class Dots(StrEnum):
@@ -53,16 +37,31 @@ def text_options(**given: Any) -> TextOptions:
     encoders.EncodeError
         When a value is out of range.
     """
-    from encoders import Presentation as Shown, TextOptions, Undefined as Policy
+    from encoders import TextOptions
 
     chosen = {name: value for name, value in given.items() if value is not None}
-    if "undefined" in chosen:
-        chosen["undefined"] = Policy(chosen["undefined"].value)
-    if "presentation" in chosen:
-        chosen["presentation"] = Shown(chosen["presentation"].value)
     if "dots" in chosen:
         chosen["dots"] = None if chosen["dots"] is Dots.AUTO else int(chosen["dots"].value)
     return replace(TextOptions(), **chosen)
+
+
+def picture_options(**given: Any) -> PictureOptions:
+    """`encoders.PictureOptions` with its own defaults wherever the command line says nothing (None).
+
+    Raises
+    ------
+    AppError, encoders.PictureError
+        When a word is not one of its choices, or a number is out of range.
+    """
+    from encoders import PictureOptions, picture_rules
+
+    chosen = {name: value for name, value in given.items() if value is not None}
+    for name, value in chosen.items():
+        words = picture_rules()[name].choices
+        if words and value not in words:
+            option = "as" if name == "output" else name
+            raise AppError(f"--{option}: expected one of {', '.join(words)}, got {value!r}")
+    return PictureOptions(**chosen)
 
 
 def place_of(words: str | None) -> tuple[int, int] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import typer
 
 from encoders import picture_rules
 
-from .command import Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
+from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
 from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
@@ -43,7 +44,9 @@ def image(
         ),
     ],
     device: Device = "paper-6x6",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav to write; none: plan only.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
+    ] = None,
     explain: Annotated[Path | None, typer.Option(help="Folder for a picture of every step.")] = None,
     style: Annotated[str | None, typer.Option(help=f"Defaults for: {_words('style')}.")] = None,
     fit: Annotated[str | None, typer.Option(help=f"How it meets the grid: {_words('fit')}.")] = None,
@@ -56,6 +59,7 @@ def image(
     zoom: Annotated[int, typer.Option(help="From 2 on: an overview, then parts of the picture.")] = 1,
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
     contrast: Contrast = 20.0,
+    actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
@@ -68,19 +72,23 @@ def image(
     Example:
       dotwave image samples/icons/heart.svg -o heart.wav --explain steps
     """
-    from ..rendering.image import picture_options, render_images
-    from ..rendering.scene import Rendering
-    from ..request import asked_of
-    from ..studies.study import Study
+    from ..api.scenes import device as device_of, image as image_scene
+    from ..rendering.render import render as render_scene
+    from ..rendering.steps import write_steps
+    from ..request import request_of
+    from .options import picture_options, place_of
 
+    request = request_of(
+        tol=tol, budget=budget, contrast_db=contrast, encoding=sample_format.value, actuator=place_of(actuator), yes=yes
+    )
     options = picture_options(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
-    study = Study(asked_of(tol=tol, budget=budget))
-    how = Rendering(output, sample_format.value, contrast, study, yes)
-    report = render_images(files, device=device, options=options, how=how, explain=explain)
-    told = study.told(report, report.ok)
-    finish(told, as_json, ok=told.ok)
+    profile = device_of(device)
+    scene = image_scene(files, profile, options)
+    steps = () if explain is None else write_steps(files, profile, options, explain)
+    report = render_scene(scene, profile, output, request)
+    finish(replace(report, files=(*report.files, *steps)), as_json, ok=report.ok)
 
 
 @commands.command(short_help="Render a set of icons and tell them apart.", rich_help_panel=RENDER)
@@ -121,13 +129,13 @@ def icons(
       dotwave icons samples/icons -o out/icons --distinct
     """
     from ..icon_sets.build import IconOptions, render_icons
-    from ..request import asked_of
+    from ..request import request_of
 
-    asked = asked_of(tol=tol, budget=budget)
+    request = request_of(tol=tol, budget=budget)
     options = IconOptions(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
-        tol=asked.tol, budget_s=asked.budget_s, yes=yes, icon_seconds=icon_seconds,
+        tol=request.tol, budget_s=request.budget_s, yes=yes, icon_seconds=icon_seconds,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)
@@ -143,10 +151,11 @@ def render(
             autocompletion=completed_files(".yaml", ".yml"),
         ),
     ],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .wav, in place of the job's.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write, in place of the job's.")] = None,
     root: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Refuse a job that leads out of this folder; for jobs of others.")
     ] = None,
+    actuator: Actuator = None,
     tol: Tol = None,
     budget: Budget = None,
     explain: Explain = False,
@@ -164,14 +173,13 @@ def render(
     Example:
       dotwave render samples/jobs/mixed.yaml
     """
-    from ..rendering.scene import render_job
-    from ..request import asked_of
-    from ..studies.study import Study
+    from ..rendering.render import render_job
+    from ..request import request_of
+    from .options import place_of
 
-    study = Study(asked_of(tol=tol, budget=budget, explain=explain, pareto=pareto))
-    report = render_job(job, output, study, root=root, yes=yes)
-    told = study.told(report, report.ok)
-    finish(told, as_json, ok=told.ok)
+    request = request_of(tol=tol, budget=budget, pareto=pareto, explain=explain, actuator=place_of(actuator), yes=yes)
+    report = render_job(job, output, request, root=root)
+    finish(report, as_json, ok=report.ok)
 
 
 @commands.command(short_help="Print the JSON Schema of job files.", rich_help_panel=RENDER)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
-from drivers import WAVEFORMS_VERSION, DriverError, Encoding, write_waveform
+from drivers import WAVEFORMS_VERSION, DriverError, Encoding
 from encoders import (
     PICTURES_VERSION,
     EncodeError,
@@ -32,6 +32,10 @@ from encoders import (
     encode_picture,
 )
 from planner import PLANS_VERSION, Plan, PlanError, plan_scene
+
+from ..errors import AppError
+from ..rendering.render import render
+from ..request import Request
 
 __all__ = [
     "Recipe",
@@ -173,18 +177,17 @@ def all_of_batch(
 
 
 def _written(recipe: Recipe, task: Task) -> Record:
-    plan = plan_scene(_scene(recipe, np.array(task.amplitude)), recipe.device, contrast_db=recipe.contrast_db)
+    scene = Scene(recipe.shape, (_frame(recipe, np.array(task.amplitude)),), {"kind": "icon"})
+    request = Request(contrast_db=recipe.contrast_db, encoding=recipe.encoding, yes=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{task.name}.wav"
         try:
-            write_waveform(plan, path, encoding=recipe.encoding)
-        except (DriverError, PlanError) as error:
+            report = render(scene, recipe.device, path, request)
+        except (AppError, DriverError, PlanError) as error:
             return {"key": task.key, "bad": " ".join(str(error).replace(folder, "").split())}
+        if not report.ok:
+            return {"key": task.key, "bad": report.notes[0]}
         return {"key": task.key, "wav": path.read_bytes(), "json": path.with_suffix(".json").read_bytes()}
-
-
-def _scene(recipe: Recipe, amplitude: Floats) -> Scene:
-    return Scene(recipe.shape, (_frame(recipe, amplitude),), {"kind": "icon"})
 
 
 def _frame(recipe: Recipe, amplitude: Floats) -> Frame:
@@ -221,7 +224,7 @@ def _planned(recipe: Recipe, amplitude: Floats) -> Record:
         except PlanError as problem:
             return {"outcome": "not_planned", "error": None, "note": " ".join(str(problem).split())}
     failed = next((frame for frame in planned if frame.outcome is not Outcome.OK), None)
-    error = max(state.error for state in planned[0].states)
+    error = planned[0].error
     return {
         "outcome": str(failed.outcome) if failed else "ok",
         "error": round(error, DIGITS) if np.isfinite(error) else None,

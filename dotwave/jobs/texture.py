@@ -41,7 +41,7 @@ class Part(BaseModel):
         return {"anyOf": [{"type": "string"}, schema]} if cls.short else schema
 
 
-class Wave(Part):
+class WavePart(Part):
     """A sinusoidal wave (`encoders.plane_wave`)."""
 
     lag_deg: Finite
@@ -80,7 +80,7 @@ class RegionPart(Part):
     bottom: AtLeastOne
     left: Place
     right: AtLeastOne
-    wave: Wave | None = None
+    wave: WavePart | None = None
     bars: Bars | None = None
 
     @model_validator(mode="after")
@@ -93,7 +93,7 @@ class RegionPart(Part):
 class TexturePart(Part):
     """A texture, exactly one of the kinds, and how long it is felt."""
 
-    wave: Wave | None = None
+    wave: WavePart | None = None
     bars: Bars | None = None
     walking_bars: Walking | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
@@ -105,6 +105,11 @@ class TexturePart(Part):
         if sum(value is not None for name, value in self if name != "dwell_s") != 1:
             raise ValueError("give exactly one of wave, bars, walking_bars, levels, regions")
         return self
+
+    @property
+    def kind(self) -> str:
+        """The key that is given."""
+        return next(name for name, value in self if name != "dwell_s" and value is not None)
 
     def target(self, shape: GridShape) -> TargetPattern:
         """The texture on a grid.
@@ -127,7 +132,7 @@ class TexturePart(Part):
         return _plain(self.wave, self.bars, shape)
 
 
-def _plain(wave: Wave | None, still: Bars | None, shape: GridShape) -> TargetPattern:
+def _plain(wave: WavePart | None, still: Bars | None, shape: GridShape) -> TargetPattern:
     if wave is not None:
         return plane_wave(shape, **wave.model_dump())
     assert still is not None

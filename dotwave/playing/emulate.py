@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import load_device
-from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, Window
+from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, FaultWindow
 
 from ..errors import AppError
 from ..plain import printable
@@ -122,7 +122,7 @@ def emulate(
     return EmulateReport(profile.name, emulator.port, emulator.status(), str(record or ""))
 
 
-def parse_window(text: str | None, name: str) -> Window | None:
+def parse_window(text: str | None, name: str) -> FaultWindow | None:
     """``at,length`` in seconds, or nothing.
 
     Raises
@@ -138,7 +138,7 @@ def parse_window(text: str | None, name: str) -> Window | None:
         raise AppError(f"--{name}: expected two numbers of seconds such as 3,2, got {text!r}") from None
     if not (start_s >= 0 and 0 <= length_s < float("inf")):
         raise AppError(f"--{name}: expected seconds >= 0, got {text!r}")
-    return Window(start_s, length_s)
+    return FaultWindow(start_s, length_s)
 
 
 def dots_as_braille(levels: NDArray[np.float64]) -> list[str]:

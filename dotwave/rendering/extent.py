@@ -14,7 +14,7 @@ from pathlib import Path
 import typer
 
 from chainsim import Device
-from drivers import Encoding, channels_of
+from drivers import FORMATS, Encoding, channels_of
 from encoders import Frame
 
 from ..errors import AppError, Declined
@@ -25,8 +25,6 @@ __all__ = ["Extent", "extent_of", "go_on"]
 SAID_BYTES, ASKED_BYTES = 100_000_000, 1_000_000_000
 # A plan ends with a way out of its last frame, mostly of about this length.
 WAY_OUT_S = 0.3
-# Bytes of a sample, the fewest and the most: a .csv has 2 characters for a zero and 14 for most other numbers.
-SAMPLE_BYTES = {".wav": (4, 4), ".npz": (8, 8), ".csv": (2, 14), ".raw": (4, 4)}
 
 
 @dataclass(frozen=True)
@@ -66,8 +64,9 @@ class Extent:
 
 def extent_of(frames: Iterable[Frame], device: Device, out: Path, encoding: Encoding, times: int = 1) -> Extent:
     """What `frames` will take in the file `out`, `times` over; they are drawn once, and none is kept."""
-    suffix = out.suffix.lower()
-    least, most = (3, 3) if (suffix, encoding) == (".wav", "pcm24") else SAMPLE_BYTES.get(suffix, (0, 0))
+    sizes = FORMATS[out.suffix.lower()].sample_bytes
+    # A number format that is not one of the file's own is refused by its writer.
+    least, most = sizes.get(encoding, next(iter(sizes.values()), (0, 0)))
     seconds = times * (sum(frame.dwell_s for frame in frames) + WAY_OUT_S)
     return Extent(seconds, len(channels_of(device)), device.amplifier.rate_hz, least, most)
 

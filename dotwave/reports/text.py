@@ -6,27 +6,25 @@ drawn with boxes and nothing said by colour.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..plain import one_line
-from .plan import PlanReport, plain
+from .report import Report, margin_lines, outcome_lines, plain
 
 __all__ = [
     "AMPLITUDE_ERROR_LIMIT",
     "CONTRAST_LIMIT_DB",
     "DOT_THRESHOLD",
     "FrameCheck",
-    "Spreading",
     "TextReport",
     "VerifyReport",
     "contrast_between",
     "decibels",
-    "margin_lines",
 ]
 
 Floats = NDArray[np.float64]
@@ -39,62 +37,29 @@ AMPLITUDE_ERROR_LIMIT = 0.02
 LISTED = 20
 
 
-class Spreading(Protocol):
-    """What a frame becomes under the device's spread, as `planner.FramePlan.spread` has it."""
-
-    @property
-    def expected(self) -> float:
-        """Expected error in units of full scale."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
-
-    def lines(self) -> Iterator[str]:
-        """Sentences for a person."""
-
-
-@dataclass(frozen=True)
-class TextReport(PlanReport):
-    """What was rendered and what the planner predicts for it.
+@dataclass(frozen=True, kw_only=True)
+class TextReport(Report):
+    """What was rendered of a text.
 
     Attributes
     ----------
-    device : name of the profile. tables : liblouis tables. text : the first characters of the source.
-    frames, pages : how many. duration_s : length of the waveform in seconds.
-    files : what was written; empty when no output was asked for.
-    peak_volts, limit_volts : largest voltage of any channel, and what the amplifier can give.
-    ramp_s : longest way into a frame. error : predicted worst deviation in units of full scale.
-    outcomes : outcome -> number of frames.
+    tables : liblouis tables. text : the first characters of the source. pages : how many.
     undefined : characters the table cannot write and what was shown instead.
     split : words cut at a page's end. differences : what back-translation does not give again.
-    notes : sentences a person should read. seconds : time taken.
-    well : largest deflection over the limit of the softening well, noise_gain : largest magnification of
-        disturbances of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest
-        Floquet multiplier of a wave (all as in `planner.Margins`). spread : of the frame that suffers most.
     """
 
-    device: str
+    KEYS = (
+        "device", "tables", "text", "frames", "pages", "duration_s", "files", "peak_volts", "limit_volts", "ramp_s",
+        "error", "outcomes", "undefined", "split", "differences", "notes", "seconds", "well", "noise_gain", "slew",
+        "multiplier", "spread",
+    )  # fmt: skip
+
     tables: tuple[str, ...]
     text: str
-    frames: int
     pages: int
-    duration_s: float
-    files: tuple[str, ...]
-    peak_volts: float
-    limit_volts: float
-    ramp_s: float
-    error: float
-    outcomes: Mapping[str, int]
     undefined: tuple[str, ...] = ()
     split: tuple[str, ...] = ()
     differences: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    seconds: float = 0.0
-    well: float = 0.0
-    noise_gain: float = 1.0
-    slew: float = 0.0
-    multiplier: float = 0.0
-    spread: Spreading | None = None
 
     def _lines(self) -> Iterator[str]:
         yield f"Rendered {_count(self.frames, 'frame')} on {_count(self.pages, 'page')} for {self.device}."
@@ -104,12 +69,10 @@ class TextReport(PlanReport):
         yield f"Deflection: at most {100 * self.well:.0f} % of the softening well's limit."
         if self.noise_gain > 1:
             yield f"Disturbances of the drive: magnified up to {self.noise_gain:.1g} times more than the drive."
-        yield from margin_lines(self.slew, self.multiplier)
+        yield from margin_lines(self)
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         yield f"Predicted error of the settled patterns: {100 * self.error:.2f} % of full scale."
-        if not self.ok:
-            counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
-            yield f"Not every frame can be made as asked: {counts}."
+        yield from outcome_lines(self)
         if self.spread is not None:
             yield from self.spread.lines()
         yield from _section("Characters the table cannot write", self.undefined)
@@ -149,6 +112,11 @@ class FrameCheck:
     wanted_cells: str = ""
     felt_cells: str = ""
     text: str = ""
+
+    @property
+    def amplitude(self) -> Floats:
+        """What is felt, in units of full scale; float64, shape (rows, cols)."""
+        return self.felt
 
     @property
     def ramp_s(self) -> float:
@@ -272,14 +240,6 @@ class VerifyReport:
 
 
 _TOTALS = ("ok", "wrong_dots", "contrast_db", "amplitude_error", "ramp_s")
-
-
-def margin_lines(slew: float, multiplier: float) -> Iterator[str]:
-    """Sentences on margins that are only told where something vibrates."""
-    if slew > 0:
-        yield f"Slew of the steady drive: at most {100 * slew:.2g} % of the amplifier's."
-    if multiplier > 0:
-        yield f"Stability: largest Floquet multiplier {multiplier:.3f} (below 1 is stable)."
 
 
 def contrast_between(wanted: NDArray[np.bool_], level: Floats) -> float | None:

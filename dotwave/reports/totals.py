@@ -1,32 +1,43 @@
-"""What is said of every plan that is carried out, whatever it shows."""
+"""The extremes over the frames of a plan, whatever it shows, and the nearest of a frame that cannot be made."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
-from chainsim import Device
-from drivers import WrittenWaveform
+from chainsim import Device, Outcome
 from planner import FramePlan
 
-from .text import Spreading
-
-__all__ = ["PlanStopped", "Tally", "nearest_lines", "peak_volts"]
+__all__ = ["Spreading", "Totals", "nearest_lines"]
 
 
-class PlanStopped(Exception):
-    """A frame cannot be made as asked and there is nothing to write, or no time is left."""
+class Spreading(Protocol):
+    """What a frame becomes under the device's spread, as `planner.FramePlan.spread` has it."""
+
+    @property
+    def expected(self) -> float:
+        """Expected error in units of full scale."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+
+    def lines(self) -> Iterator[str]:
+        """Sentences for a person."""
 
 
 @dataclass
-class Tally:
+class Totals:
     """Extremes over the frames passed so far; units as in `planner.FramePlan` and `planner.Margins`.
 
-    `spread` is that of the frame with the largest expected error, None where no frame has one.
+    `outcomes` counts frames by outcome, with the way out after the last where it cannot be made. `pages` counts those
+    that were begun. `spread` is that of the frame with the largest expected error, None where no frame has one.
     """
 
+    outcomes: dict[str, int] = field(default_factory=dict)
+    pages: int = 0
     duration_s: float = 0.0
     ramp_s: float = 0.0
     error: float = 0.0
@@ -36,13 +47,19 @@ class Tally:
     slew: float = 0.0
     multiplier: float = 0.0
     spread: Spreading | None = None
+    _page: int = -1
 
     def add(self, frame: FramePlan) -> None:
         """Take a frame into account."""
+        if frame.frame is not None or frame.outcome is not Outcome.OK:
+            self.outcomes[str(frame.outcome)] = self.outcomes.get(str(frame.outcome), 0) + 1
+        if frame.frame is not None and frame.frame.page != self._page:
+            self._page = frame.frame.page
+            self.pages += 1
         margins = [state.margins for state in frame.states]
         self.duration_s = frame.end_s
         self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
-        self.error = max(self.error, *(state.error for state in frame.states))
+        self.error = max(self.error, frame.error)
         self.volts = max(self.volts, *(margin.volts for margin in margins))
         self.well = max(self.well, *(margin.well for margin in margins))
         self.noise_gain = max(self.noise_gain, *(margin.noise_gain for margin in margins))
@@ -51,12 +68,11 @@ class Tally:
         if frame.spread is not None and (self.spread is None or frame.spread.expected > self.spread.expected):
             self.spread = frame.spread
 
-
-def peak_volts(written: WrittenWaveform | None, tally: Tally, device: Device) -> float:
-    """Largest voltage of any channel: as written, else as planned."""
-    if written is not None:
-        return float(np.max(np.abs(written.peak_volts)))
-    return tally.volts * device.amplifier.volts
+    def of_report(self) -> dict[str, Any]:
+        """The attributes of a `Report` that are known from here."""
+        same = ("duration_s", "ramp_s", "error", "well", "noise_gain", "slew", "multiplier", "spread")
+        found = {name: getattr(self, name) for name in same}
+        return found | {"frames": sum(self.outcomes.values()), "outcomes": dict(self.outcomes)}
 
 
 def nearest_lines(frame: FramePlan, device: Device) -> Iterator[str]:

@@ -21,9 +21,9 @@ from ..workers import end_with_parent
 if TYPE_CHECKING:
     from chainsim import SettingSweep
 
-    from .sweep_files import Arrays, Parts
+    from .sweep_files import Arrays, SweepParts
 
-__all__ = ["FIELDS", "SweepReport", "run_sweep"]
+__all__ = ["FIELDS", "SweepReport", "answers", "run_sweep"]
 
 FIELDS = (
     "epsilon", "lam", "omega", "outcome", "phasor", "phase_step_deg", "third", "mean", "stable", "locked",
@@ -88,7 +88,7 @@ def run_sweep(
     from chainsim import read_sweep, unit_of
     from drivers import FileError, atomic_file, made_folder
 
-    from .sweep_files import WRITERS, Parts
+    from .sweep_files import WRITERS, SweepParts
     from .sweep_parts import claimed, removed
 
     began = time.perf_counter()
@@ -103,7 +103,7 @@ def run_sweep(
     chunk = units * unit_of(sweep.chain.n)
     fields = tuple(name for name in FIELDS if name in only)
     note = _note(sweep, fields, chunk)
-    stored = Parts(out.with_name(out.name + ".parts"), range(0, len(sweep), chunk), note["sweep"])
+    stored = SweepParts(out.with_name(out.name + ".parts"), range(0, len(sweep), chunk), note["sweep"])
     try:
         with made_folder(out), claimed(stored.folder, note):
             todo = [first for first in stored.firsts if not stored.done(first)]
@@ -128,7 +128,13 @@ def _note(sweep: SettingSweep, fields: tuple[str, ...], chunk: int) -> dict[str,
 
 
 def _solve_all(
-    source: Path, stored: Parts, todo: list[int], chunk: int, fields: tuple[str, ...], workers: int, sweep: SettingSweep
+    source: Path,
+    stored: SweepParts,
+    todo: list[int],
+    chunk: int,
+    fields: tuple[str, ...],
+    workers: int,
+    sweep: SettingSweep,
 ) -> None:
     with progress("sweep") as update:
         if workers == 1 or len(todo) < 2:
@@ -144,19 +150,19 @@ def _solve_all(
                 job.result()
 
 
-def _solve_in_process(source: Path, stored: Parts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
+def _solve_in_process(source: Path, stored: SweepParts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
     from chainsim import read_sweep
 
     _solve_part(read_sweep(source), stored, first, chunk, fields)
 
 
-def _solve_part(sweep: SettingSweep, stored: Parts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
-    solved = _answers(sweep, first, first + chunk, fields)
+def _solve_part(sweep: SettingSweep, stored: SweepParts, first: int, chunk: int, fields: tuple[str, ...]) -> None:
+    solved = answers(sweep, first, first + chunk, fields)
     # The outcome is counted for the report whether or not it is asked for.
     stored.save(first, solved)
 
 
-def _counted(stored: Parts) -> dict[str, int]:
+def _counted(stored: SweepParts) -> dict[str, int]:
     counts: dict[str, int] = {}
     for outcomes in stored.field("outcome"):
         for name, count in zip(*np.unique(outcomes, return_counts=True), strict=True):
@@ -164,7 +170,8 @@ def _counted(stored: Parts) -> dict[str, int]:
     return counts
 
 
-def _answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]) -> Arrays:
+def answers(sweep: SettingSweep, first: int, last: int, fields: tuple[str, ...]) -> Arrays:
+    """Solve the settings first..last-1; their outcomes and `fields` by name, each with an entry a setting."""
     from chainsim import sweep as solve_many
 
     setting = sweep.settings(first, last)

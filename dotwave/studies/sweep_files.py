@@ -18,7 +18,7 @@ from drivers import atomic_file
 
 from ..errors import AppError
 
-__all__ = ["WRITERS", "Arrays", "Parts"]
+__all__ = ["WRITERS", "Arrays", "SweepParts"]
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -30,7 +30,7 @@ DIGEST = 32  # bytes
 
 
 @dataclass(frozen=True)
-class Parts:
+class SweepParts:
     """Chunks of the sweep `sweep` (its digest) in `folder`; `firsts` are the numbers of their first settings."""
 
     folder: Path
@@ -82,7 +82,7 @@ class Parts:
         return digest.digest()
 
 
-def _write_npz(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int) -> None:
+def _write_npz(file: BinaryIO, parts: SweepParts, fields: tuple[str, ...], size: int) -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name in fields:
             info = zipfile.ZipInfo(f"{name}.npy", EPOCH)
@@ -97,7 +97,7 @@ def _write_npz(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int)
                     stream.write(np.ascontiguousarray(array).data.cast("B"))
 
 
-def _write_csv(file: BinaryIO, parts: Parts, fields: tuple[str, ...], size: int) -> None:
+def _write_csv(file: BinaryIO, parts: SweepParts, fields: tuple[str, ...], size: int) -> None:
     """A line for each setting; numbers as short as they can be read back exactly, what is not known as nothing."""
     stream = TextIOWrapper(file, encoding="utf-8", newline="\n")
     for number, chunk in enumerate(zip(*(parts.field(name) for name in fields), strict=True)):
@@ -129,5 +129,8 @@ def _texts(column: NDArray[Any]) -> list[str]:
     return [str(value) for value in column.tolist()]
 
 
-WRITERS: dict[str, Callable[[BinaryIO, Parts, tuple[str, ...], int], None]] = {".npz": _write_npz, ".csv": _write_csv}
+WRITERS: dict[str, Callable[[BinaryIO, SweepParts, tuple[str, ...], int], None]] = {
+    ".npz": _write_npz,
+    ".csv": _write_csv,
+}
 """How to join the parts of a sweep into an open file, by suffix."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import Any
 
-from drivers import Part, held, is_at, part_of, settled
+from drivers import PartFile, held, is_at, part_of, settled
 
 from ..errors import AppError
 
@@ -76,7 +76,7 @@ def removed(folder: Path, firsts: range) -> None:
 
 
 def _aside(folder: Path) -> Path:
-    return Part(folder, secrets.token_hex(8)).part
+    return PartFile(folder, secrets.token_hex(8)).part
 
 
 def _make(folder: Path, note: Mapping[str, Any]) -> None:

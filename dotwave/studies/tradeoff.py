@@ -13,8 +13,8 @@ from encoders import GridShape, Scene, TargetPattern, TextOptions, encode_text
 from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
 
 from ..errors import AppError
-from ..reports.plan import plain
-from ..request import FrameAsked, picture_name
+from ..reports.report import plain
+from ..request import FrameRequest, picture_name
 from ..source import text_source
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ def planned(source: str, device: str | None, *, otherwise: str = "paper-6x6") ->
 
 
 def _of_job(path: Path, given: Device | None) -> tuple[Scene, Device, float]:
-    from ..jobs.scene import joined, read_job_scene
+    from ..jobs.scene import read_job_scene
 
     found = read_job_scene(path, device=given)
-    return joined(found.parts, found.shape), found.device, found.job.contrast_db
+    return found, found.device, found.job.contrast_db
 
 
 @dataclass(frozen=True)
@@ -224,10 +224,10 @@ def trade_frame(source: str, *, device: str | None, frame: int, picture: Path | 
     chosen = next(islice(iter(scene.frames), frame - 1, None), None) if frame > 0 else None
     if chosen is None:
         raise AppError(f"--frame: the scene has no frame {frame}; count from 1")
-    return pareto_report(chosen.pattern, plan.device, FrameAsked(frame, picture))
+    return pareto_report(chosen.pattern, plan.device, FrameRequest(frame, picture))
 
 
-def pareto_report(pattern: TargetPattern, device: Device, asked: FrameAsked) -> ParetoReport:
+def pareto_report(pattern: TargetPattern, device: Device, asked: FrameRequest) -> ParetoReport:
     """The Pareto set of a pattern; with a picture, drawn (PNG or SVG).
 
     Raises

@@ -6,15 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from .curves import DIGITS, HapticCurves, require, rounded, sharpness_hz, sharpness_of, single_curve
+from planner import Plan
 
-__all__ = ["read_ahap", "to_ahap"]
+from .curves import DIGITS, HapticCurves, haptic_curves, require, rounded, sharpness_hz, sharpness_of, single_curve
+
+__all__ = ["content_of", "curves_of"]
 
 POINTS, EVENT_S = 16, 30.0
 
 
-def to_ahap(curves: HapticCurves) -> dict[str, Any]:
-    """The content of a file for curves of one actuator."""
+def content_of(plan: Plan, actuator: tuple[int, int] | None) -> dict[str, Any]:
+    """The content of a file for one actuator (row, col) of a plan, or (None) the mean over the grid."""
+    curves = haptic_curves(plan).of(actuator)
     time_s, level = curves.time_s, curves.level[:, 0, 0]
     sharpness = sharpness_of(curves.frequency_hz[0])
     pattern: list[dict[str, Any]] = []
@@ -42,8 +45,8 @@ def to_ahap(curves: HapticCurves) -> dict[str, Any]:
     return {"Version": 1.0, "Pattern": pattern}
 
 
-def read_ahap(data: Any) -> HapticCurves:
-    """The curve of a file, which is checked against the rules of the format; as `read_hjif`."""
+def curves_of(data: Any) -> HapticCurves:
+    """The curve of a file, which is checked against the rules of the format; as that of HJIF."""
     require(data["Version"] == 1.0, "Version is 1.0")
     keys: dict[float, float] = {}
     sharpness = 0.0

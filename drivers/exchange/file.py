@@ -7,20 +7,15 @@ Meta's .haptic 1.0. Each keeps levels and their times to a millisecond; only HJI
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from planner import Plan
 
-from ..errors import FileError, UnreadableWaveform
+from ..errors import UnreadableWaveform
 from ..files.whole import atomic_file, first_of_plain, naming
-from ..formats.samples import EXCHANGE_SUFFIXES
+from ..formats.table import EXCHANGE_SUFFIXES, format_of
 from ..waveform.manifest import MOST_BYTES
-from .ahap import read_ahap, to_ahap
-from .curves import HapticCurves, haptic_curves
-from .haptic import read_meta, to_meta
-from .hjif import read_hjif, to_hjif
+from .curves import HapticCurves
 
 __all__ = ["read_exchange", "write_exchange"]
 
@@ -40,10 +35,7 @@ def write_exchange(plan: Plan, path: Path | str, *, actuator: tuple[int, int] | 
         When the ending is none of these, or the file system refuses.
     """
     path = Path(path)
-    suffix = _suffix(path)
-    curves = haptic_curves(plan)
-    single = to_ahap if suffix == ".ahap" else to_meta
-    content = to_hjif(curves, plan) if suffix == ".hjif" else single(curves.of(actuator))
+    content = format_of(path, EXCHANGE_SUFFIXES).writer_module().content_of(plan, actuator)
     text = json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
     with atomic_file(path) as file, naming(path):
         file.write(text.encode())
@@ -60,22 +52,14 @@ def read_exchange(path: Path | str) -> HapticCurves:
         With the rule it breaks, and where.
     """
     path = Path(path)
-    reader: Callable[[Any], HapticCurves] = {".hjif": read_hjif, ".ahap": read_ahap, ".haptic": read_meta}[
-        _suffix(path)
-    ]
+    form = format_of(path, EXCHANGE_SUFFIXES)
     raw = first_of_plain(path, MOST_BYTES + 1)
     if len(raw) > MOST_BYTES:
         raise UnreadableWaveform(f"{path}: more than {MOST_BYTES} bytes; a haptic file has at most so many")
     try:
-        return reader(json.loads(raw))
+        curves: HapticCurves = form.reader_module().curves_of(json.loads(raw))
     except KeyError as error:
         raise UnreadableWaveform(f"{path}: the key {error} is missing") from None
     except (ValueError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
         raise UnreadableWaveform(f"{path}: {error}") from None
-
-
-def _suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in EXCHANGE_SUFFIXES:
-        raise FileError(f"{path}: expected a name that ends in {', '.join(EXCHANGE_SUFFIXES)}")
-    return suffix
+    return curves

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from .curves import HapticCurves, require, rounded, sharpness_hz, sharpness_of, single_curve
+from planner import Plan
 
-__all__ = ["read_meta", "to_meta"]
+from .curves import HapticCurves, haptic_curves, require, rounded, sharpness_hz, sharpness_of, single_curve
+
+__all__ = ["content_of", "curves_of"]
 
 
-def to_meta(curves: HapticCurves) -> dict[str, Any]:
-    """The content of a file for curves of one actuator."""
+def content_of(plan: Plan, actuator: tuple[int, int] | None) -> dict[str, Any]:
+    """The content of a file for one actuator (row, col) of a plan, or (None) the mean over the grid."""
+    curves = haptic_curves(plan).of(actuator)
     time_s, level = curves.time_s, curves.level[:, 0, 0]
     pitch = sharpness_of(curves.frequency_hz[0])
     amplitude = [{"time": rounded(t), "amplitude": rounded(v)} for t, v in zip(time_s, level, strict=True)]
@@ -24,8 +27,8 @@ def to_meta(curves: HapticCurves) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def read_meta(data: Any) -> HapticCurves:
-    """The curve of a file, which is checked against the rules of the format; as `read_hjif`."""
+def curves_of(data: Any) -> HapticCurves:
+    """The curve of a file, which is checked against the rules of the format; as that of HJIF."""
     require(data["version"]["major"] == 1 and "metadata" in data, "version 1 and metadata are required")
     envelopes = data["signals"]["continuous"]["envelopes"]
     amplitude, frequency = envelopes["amplitude"], envelopes["frequency"]

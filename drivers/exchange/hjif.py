@@ -10,15 +10,16 @@ import numpy as np
 
 from planner import Plan
 
-from .curves import HapticCurves, require, rounded
+from .curves import HapticCurves, haptic_curves, require, rounded
 
-__all__ = ["read_hjif", "to_hjif"]
+__all__ = ["content_of", "curves_of"]
 
 TIMESCALE = 1000  # ticks a second
 
 
-def to_hjif(curves: HapticCurves, plan: Plan) -> dict[str, Any]:
-    """The content of a file: profile Main, one vectorial-wave band a channel."""
+def content_of(plan: Plan, _actuator: tuple[int, int] | None) -> dict[str, Any]:
+    """The content of a file for a plan: profile Main, one vectorial-wave band a channel, all actuators."""
+    curves = haptic_curves(plan)
     rows, cols = curves.level.shape[1:]
     device = plan.device
     reference = {
@@ -73,7 +74,7 @@ def _hjif_channel(curves: HapticCurves, row: int, col: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def read_hjif(data: Any) -> HapticCurves:
+def curves_of(data: Any) -> HapticCurves:
     """The curves of a file, which is checked against the rules of the format.
 
     Raises

@@ -23,7 +23,7 @@ from typing import BinaryIO
 
 from .locks import alone_in, held
 
-__all__ = ["Belongs", "Part", "finish", "is_at", "make", "part_of", "settle", "settle_alone", "sync_folder"]
+__all__ = ["Belongs", "PartFile", "finish", "is_at", "make", "part_of", "settle", "settle_alone", "sync_folder"]
 
 Belongs = Callable[[str], bool]
 """Whether a file of this name may be put in place."""
@@ -36,7 +36,7 @@ OLD = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 @dataclass(frozen=True)
-class Part:
+class PartFile:
     """A file on its way to `path`, of the write `token`."""
 
     path: Path
@@ -56,13 +56,13 @@ class Part:
         return self.path.with_name(f".{self.path.name}.dotwave-{self.token}.{state}")
 
 
-def part_of(path: Path) -> Part | None:
+def part_of(path: Path) -> PartFile | None:
     """What `path` is a part of, by its name; None for any other file."""
     found = PATTERN.fullmatch(path.name)
-    return None if found is None else Part(path.with_name(found["name"]), found["token"])
+    return None if found is None else PartFile(path.with_name(found["name"]), found["token"])
 
 
-def make(part: Part) -> BinaryIO:
+def make(part: PartFile) -> BinaryIO:
     """Make the file of a part, with the permissions any new file gets, open for writing and reading, and locked."""
     while True:
         file = os.fdopen(os.open(part.part, NEW, 0o666), "w+b")
@@ -73,7 +73,7 @@ def make(part: Part) -> BinaryIO:
         part.part.unlink(missing_ok=True)
 
 
-def finish(parts: Sequence[Part]) -> None:
+def finish(parts: Sequence[PartFile]) -> None:
     """Put the files of a write in place when it counts; else delete its parts. Goes by what is on the disk.
 
     Raises
@@ -125,7 +125,7 @@ def settle_alone(folder: Path, belongs: Belongs, *, others: bool) -> frozenset[s
     return frozenset(left)
 
 
-def _settle(folder: Path, token: str, parts: Sequence[Part], belongs: Belongs) -> set[str]:
+def _settle(folder: Path, token: str, parts: Sequence[PartFile], belongs: Belongs) -> set[str]:
     with ExitStack() as stack:
         if not all(_locked(one, stack) for one in parts):
             return set()
@@ -139,9 +139,9 @@ def _settle(folder: Path, token: str, parts: Sequence[Part], belongs: Belongs) -
         return set()
 
 
-def _left_in(folder: Path) -> dict[str, list[Part]]:
+def _left_in(folder: Path) -> dict[str, list[PartFile]]:
     """Parts by token: plain files with one name that belong to this user."""
-    found: dict[str, list[Part]] = {}
+    found: dict[str, list[PartFile]] = {}
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             part = part_of(folder / entry.name) if PATTERN.fullmatch(entry.name) else None
@@ -154,7 +154,7 @@ def _left_in(folder: Path) -> dict[str, list[Part]]:
     return found
 
 
-def _locked(part: Part, stack: ExitStack) -> bool:
+def _locked(part: PartFile, stack: ExitStack) -> bool:
     for path in (part.part, part.ready):
         with suppress(OSError):
             number = os.open(path, OLD)

@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from ..errors import FileError
 from .locks import alone_in
-from .parts import Belongs, Part, finish, is_at, make, settle, settle_alone, sync_folder
+from .parts import Belongs, PartFile, finish, is_at, make, settle, settle_alone, sync_folder
 
 __all__ = ["atomic_file", "atomic_files", "check_plain", "first_of_plain", "made_folder", "naming", "settled"]
 
@@ -118,7 +118,7 @@ def atomic_files(*paths: Path, belongs: Belongs | None = None) -> Iterator[tuple
 @contextmanager
 def _aside(paths: tuple[Path, ...], belongs: Belongs | None) -> Iterator[tuple[BinaryIO, ...]]:
     folder, token = paths[0].parent, secrets.token_hex(8)
-    parts = [Part(path, token) for path in paths]
+    parts = [PartFile(path, token) for path in paths]
     files: list[BinaryIO] = []
     place = os.path.abspath(folder)
     belongs = belongs or {path.name for path in paths}.__contains__
@@ -156,7 +156,7 @@ def settled(path: Path, belongs: Belongs) -> None:
         settle(path.parent, belongs, others=False)
 
 
-def _flush(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
+def _flush(parts: Sequence[PartFile], files: Sequence[BinaryIO]) -> None:
     """Bring all files to the disk."""
     for part, file in zip(parts, files, strict=True):
         with naming(part.path):
@@ -164,7 +164,7 @@ def _flush(parts: Sequence[Part], files: Sequence[BinaryIO]) -> None:
             os.fsync(file.fileno())
 
 
-def _put_in_place(parts: Sequence[Part], files: Sequence[BinaryIO], others: Belongs | None) -> None:
+def _put_in_place(parts: Sequence[PartFile], files: Sequence[BinaryIO], others: Belongs | None) -> None:
     """Do the one rename that makes the files count, and give them their names.
 
     `others` : files of these names that another writer, who began later and died, may have left half done; these get
@@ -190,7 +190,7 @@ def _put_in_place(parts: Sequence[Part], files: Sequence[BinaryIO], others: Belo
         _finish(parts)
 
 
-def _finish(parts: Sequence[Part]) -> None:
+def _finish(parts: Sequence[PartFile]) -> None:
     try:
         finish(parts)
     except OSError as error:

@@ -16,7 +16,7 @@ from ..errors import UnreadableWaveform
 from ..files.whole import naming
 from .raw import check_finite
 
-__all__ = ["CsvReader", "CsvWriter"]
+__all__ = ["CsvReader", "CsvWriter", "open_reader", "open_writer"]
 
 Floats = NDArray[np.float64]
 
@@ -111,3 +111,11 @@ class CsvReader:
         if late.any():
             raise UnreadableWaveform(f"{self.path}:{first + 2 + int(np.argmax(late))}: not the time of this sample")
         return np.asarray(values, dtype=np.float64)
+
+
+def open_writer(file: BinaryIO, channels: Sequence[Channel], rate_hz: int, _encoding: str) -> CsvWriter:
+    """A writer on an open and empty file."""
+    return CsvWriter(file, channels, rate_hz)
+
+
+open_reader = CsvReader.open

@@ -21,7 +21,7 @@ from ..errors import UnreadableWaveform
 from ..files.whole import naming
 from .raw import check_finite
 
-__all__ = ["NpzReader", "NpzWriter"]
+__all__ = ["NpzReader", "NpzWriter", "open_reader", "open_writer"]
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +45,10 @@ class NpzWriter:
         self._rate_hz = rate_hz
         self._waiting = tempfile.TemporaryFile()  # noqa: SIM115 - closed by finish, or with the writer
         self.samples = 0
+
+    def __del__(self) -> None:
+        # A writer that was given up has not finished.
+        self._waiting.close()
 
     def write(self, block: Floats) -> None:
         """Append samples; float64, shape (S, channels), volts."""
@@ -135,3 +139,11 @@ def _header(member: IO[bytes]) -> NpyHeader:
     if header.fortran or header.dtype != np.dtype("<f8"):
         raise ValueError(f"volts are {header.dtype}, expected little-endian float64 in C order")
     return header
+
+
+def open_writer(file: BinaryIO, channels: Sequence[Channel], rate_hz: int, _encoding: str) -> NpzWriter:
+    """A writer on an open and empty file."""
+    return NpzWriter(file, channels, rate_hz)
+
+
+open_reader = NpzReader.open

@@ -14,7 +14,7 @@ from ..channels import Channel
 from ..errors import UnreadableWaveform
 from ..files.whole import naming
 
-__all__ = ["RawReader", "RawWriter", "check_finite"]
+__all__ = ["RawReader", "RawWriter", "check_finite", "open_reader", "open_writer"]
 
 Floats = NDArray[np.float64]
 
@@ -99,3 +99,11 @@ def check_finite(path: Path, values: Floats, first: int, rate_hz: int) -> None:
         raise UnreadableWaveform(
             f"{path}: channel {channel} at {time_s:.6g} s is {values[sample, channel]}, not a number"
         )
+
+
+def open_writer(file: BinaryIO, channels: Sequence[Channel], rate_hz: int, _encoding: str) -> RawWriter:
+    """A writer on an open and empty file."""
+    return RawWriter(file, channels, rate_hz)
+
+
+open_reader = RawReader.open

@@ -1,9 +1,8 @@
-"""Which file format a name's ending stands for, and what every format supplies."""
+"""What every format of samples supplies, and opening a file by the ending of its name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
@@ -11,36 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..channels import Channel
-from ..errors import FileError, WaveformError
+from ..errors import WaveformError
 from ..files.whole import check_plain
-from .wav import Encoding, WavWriter
-from .wav_reader import WavReader
+from .table import FORMATS, SUFFIXES, format_of
+from .wav import Encoding
 
-__all__ = [
-    "EXCHANGE_SUFFIXES",
-    "SUFFIXES",
-    "SampleReader",
-    "SampleWriter",
-    "check_suffix",
-    "open_samples",
-    "writer_for",
-]
+__all__ = ["SampleReader", "SampleWriter", "open_samples", "writer_for"]
 
 Floats = NDArray[np.float64]
-
-SUFFIXES = {
-    ".wav": "for amplifiers; float32 keeps 24 significant bits, PCM24 half a step of the full scale over 2^23",
-    ".npz": "exact float64 volts, for numpy",
-    ".csv": "volts with 9 significant digits and a time column, for people",
-    ".raw": "float32 of full scale, little-endian, channels interleaved, no header",
-}
-"""Ending of the name -> what the format is for and what it loses."""
-
-EXCHANGE_SUFFIXES = (".hjif", ".ahap", ".haptic")
-"""Endings of haptic files, which carry no samples (`drivers.exchange`)."""
-
-# Imported only for a file of theirs: a short text is written in less time than their imports take.
-OTHERS = {".npz": (".npz", "Npz"), ".csv": (".csv", "Csv"), ".raw": (".raw", "Raw")}
 
 
 class SampleWriter(Protocol):
@@ -80,24 +57,6 @@ class SampleReader(Protocol):
         ...
 
 
-def check_suffix(path: Path) -> str:
-    """The ending of `path`, if it stands for a format.
-
-    Raises
-    ------
-    FileError
-        When it does not (the message lists those that do), or the name cannot stand in a manifest.
-    """
-    suffix = path.suffix.lower()
-    try:
-        path.name.encode()
-    except UnicodeEncodeError:
-        raise FileError(f"{path}: its name is not UTF-8 and cannot stand in a manifest; give another") from None
-    if suffix not in SUFFIXES:
-        raise FileError(f"{path}: expected a name that ends in {', '.join((*SUFFIXES, *EXCHANGE_SUFFIXES))}")
-    return suffix
-
-
 def writer_for(
     path: Path, file: BinaryIO, channels: Sequence[Channel], rate_hz: int, encoding: Encoding
 ) -> SampleWriter:
@@ -108,13 +67,11 @@ def writer_for(
     FileError, WaveformError
         When there is none, or the encoding is not one of its own.
     """
-    suffix = check_suffix(path)
-    if suffix == ".wav":
-        return WavWriter(file, channels, rate_hz, encoding)
-    if encoding != "float32":
-        raise WaveformError(f"{path}: {encoding} is an encoding of .wav; leave it out, or write a .wav")
-    module, name = OTHERS[suffix]
-    writer: SampleWriter = getattr(import_module(module, __package__), f"{name}Writer")(file, channels, rate_hz)
+    form = format_of(path, SUFFIXES)
+    if encoding not in form.sample_bytes:
+        others = " and ".join(suffix for suffix in SUFFIXES if encoding in FORMATS[suffix].sample_bytes)
+        raise WaveformError(f"{path}: {encoding} is an encoding of {others}; leave it out, or write a {others}")
+    writer: SampleWriter = form.writer_module().open_writer(file, channels, rate_hz, encoding)
     return writer
 
 
@@ -126,10 +83,7 @@ def open_samples(path: Path, channels: Sequence[Channel], rate_hz: int) -> Sampl
     FileError, UnreadableWaveform
         When the file cannot be read or is not of that format.
     """
-    suffix = check_suffix(path)
+    form = format_of(path, SUFFIXES)
     check_plain(path)
-    if suffix == ".wav":
-        return WavReader.open(path, [channel.volts_per_unit for channel in channels])
-    module, name = OTHERS[suffix]
-    reader: SampleReader = getattr(import_module(module, __package__), f"{name}Reader").open(path, channels, rate_hz)
+    reader: SampleReader = form.reader_module().open_reader(path, channels, rate_hz)
     return reader

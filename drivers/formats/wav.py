@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..channels import Channel
 from ..errors import LimitError, WaveformError
 
-__all__ = ["EXTENSIBLE", "FLOAT", "PCM", "RIFF_LIMIT", "SUBFORMAT_TAIL", "Encoding", "WavWriter"]
+__all__ = ["EXTENSIBLE", "FLOAT", "PCM", "RIFF_LIMIT", "SUBFORMAT_TAIL", "Encoding", "WavWriter", "open_writer"]
 
 Floats = NDArray[np.float64]
 Encoding = Literal["float32", "pcm24"]
@@ -31,7 +31,7 @@ class _Format:
     sample_bytes: int
 
 
-FORMATS = {"float32": _Format(FLOAT, 4), "pcm24": _Format(PCM, 3)}
+NUMBERS = {"float32": _Format(FLOAT, 4), "pcm24": _Format(PCM, 3)}
 
 
 class WavWriter:
@@ -61,9 +61,9 @@ class WavWriter:
         *,
         riff_limit: int = RIFF_LIMIT,
     ) -> None:
-        if encoding not in FORMATS:
+        if encoding not in NUMBERS:
             raise WaveformError(f"encoding: expected {' or '.join(get_args(Encoding))}, got {encoding!r}")
-        self._format = FORMATS[encoding]
+        self._format = NUMBERS[encoding]
         align = len(channels) * self._format.sample_bytes
         if align > 0xFFFF or align * rate_hz > 0xFFFFFFFF:
             raise WaveformError(
@@ -145,3 +145,6 @@ class WavWriter:
             b"fact", struct.pack("<II", 4, small[1]),
             b"data", struct.pack("<I", small[2]),
         ])  # fmt: skip
+
+
+open_writer = WavWriter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -12,11 +12,12 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..channels import Channel
 from ..errors import UnreadableWaveform
 from ..files.whole import naming
 from .wav import EXTENSIBLE, FLOAT, PCM, SUBFORMAT_TAIL
 
-__all__ = ["WavReader"]
+__all__ = ["WavReader", "open_reader"]
 
 Floats = NDArray[np.float64]
 
@@ -216,3 +217,8 @@ def _u32(raw: bytes) -> int:
 
 def _bad(path: Path, why: str) -> UnreadableWaveform:
     return UnreadableWaveform(f"{path}: not a readable WAV: {why}")
+
+
+def open_reader(path: Path, channels: Sequence[Channel], _rate_hz: int) -> WavReader:
+    """A reader that gives volts; raises as `WavReader.open` does."""
+    return WavReader.open(path, [channel.volts_per_unit for channel in channels])

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from .cobs import DELIMITER
 
-__all__ = ["Faults", "FaultyLine", "Window"]
+__all__ = ["FaultWindow", "Faults", "FaultyLine"]
 
 
 @dataclass(frozen=True)
-class Window:
+class FaultWindow:
     """A stretch of time, seconds since the line was made."""
 
     start_s: float
@@ -37,8 +37,8 @@ class Faults:
     corrupt: float = 0.0
     duplicate: float = 0.0
     delay_s: float = 0.0
-    stall: Window | None = None
-    disconnect: Window | None = None
+    stall: FaultWindow | None = None
+    disconnect: FaultWindow | None = None
 
     def __post_init__(self) -> None:
         for name in ("drop", "corrupt", "duplicate"):

@@ -9,7 +9,7 @@ from enum import Enum
 
 from ..errors import DriverError
 from .cobs import DELIMITER
-from .messages import VERSION, Ack, Capabilities, Flag, Marked, Refused, Samples, Start, State
+from .messages import VERSION, Ack, Capabilities, Flag, Marked, Refused, SamplesMessage, StartMessage, State
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
 from .under_way import UnderWay
@@ -198,11 +198,11 @@ class HostSession:
         if message is None or self._window.full:
             return False
         samples = 0
-        if isinstance(message, Samples):
+        if isinstance(message, SamplesMessage):
             if ack is None or message.first + len(message.codes) > ack.accept_samples:
                 return False
             samples = len(message.codes)
-        elif not isinstance(message, Start | End):
+        elif not isinstance(message, StartMessage | End):
             if ack is None or self._events >= ack.accept_events:
                 return False
             self._events += 1

@@ -24,11 +24,11 @@ __all__ = [
     "Mark",
     "Marked",
     "Refused",
-    "Samples",
-    "Start",
+    "SamplesMessage",
+    "StartMessage",
     "State",
-    "Tone",
     "Tones",
+    "WireTone",
 ]
 
 Codes = NDArray[np.int16]
@@ -105,7 +105,7 @@ class Capabilities:
 
 
 @dataclass(frozen=True)
-class Start:
+class StartMessage:
     """A session begins: `total` samples will come (or, `parametric`, tones and biases for as long).
 
     `note` is for people and recorders (JSON); a controller may pass over it.
@@ -125,7 +125,7 @@ class Start:
         return Packet(Kind.START, number, head + self.note)
 
     @classmethod
-    def of(cls, packet: Packet) -> Start:
+    def of(cls, packet: Packet) -> StartMessage:
         """From bytes."""
         session, parametric, rate_hz, total = cls._struct.unpack_from(packet.payload)
         return cls(session, bool(parametric), rate_hz, total, packet.payload[cls._struct.size :])
@@ -177,7 +177,7 @@ class Bias:
 
 
 @dataclass(frozen=True)
-class Tone:
+class WireTone:
     """``volts * cos(2 pi hz t + phase)``, t in seconds from sample 0 of the session, phase in radians."""
 
     volts: float
@@ -192,7 +192,7 @@ class Tones:
     at: int
     channel: int
     ramp: int
-    tones: tuple[Tone, ...]
+    tones: tuple[WireTone, ...]
 
     _struct: ClassVar = struct.Struct("<QHI")
     _tone: ClassVar = struct.Struct("<fff")
@@ -206,7 +206,7 @@ class Tones:
     def of(cls, packet: Packet) -> Tones:
         """From bytes."""
         rest = packet.payload[cls._struct.size :]
-        tones = tuple(Tone(*values) for values in cls._tone.iter_unpack(rest))
+        tones = tuple(WireTone(*values) for values in cls._tone.iter_unpack(rest))
         return cls(*(*cls._struct.unpack_from(packet.payload), tones))
 
 
@@ -231,7 +231,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Samples:
+class SamplesMessage:
     """The samples from `first` on; int16, shape (S, channels), full_volts / 32767 volts a step."""
 
     first: int
@@ -242,7 +242,7 @@ class Samples:
     @staticmethod
     def most(channels: int, max_payload: int) -> int:
         """How many samples of all channels fit into one packet; 0 when not even one does."""
-        return (min(max_payload, MAX_PAYLOAD) - Samples._struct.size) // (2 * channels)
+        return (min(max_payload, MAX_PAYLOAD) - SamplesMessage._struct.size) // (2 * channels)
 
     def packet(self, number: int) -> Packet:
         """As bytes."""
@@ -250,7 +250,7 @@ class Samples:
         return Packet(Kind.SAMPLES, number, head + self.codes.astype("<i2").tobytes())
 
     @classmethod
-    def of(cls, packet: Packet, channels: int) -> Samples | None:
+    def of(cls, packet: Packet, channels: int) -> SamplesMessage | None:
         """From bytes; None when there are not `count` samples of `channels` channels."""
         first, count = cls._struct.unpack_from(packet.payload)
         flat = np.frombuffer(packet.payload, dtype="<i2", offset=cls._struct.size)

@@ -14,7 +14,7 @@ from ..errors import DriverError
 from ..formats.samples import SampleReader
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
-from .messages import FULL_CODE, VERSION, Capabilities, LinkCoupling, Mark, Samples, Start
+from .messages import FULL_CODE, VERSION, Capabilities, LinkCoupling, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
@@ -43,7 +43,7 @@ class End:
         return Packet(Kind.END, number, struct.pack("<Q", self.total))
 
 
-Message = Start | Event | Samples | End
+Message = StartMessage | Event | SamplesMessage | End
 
 
 def check_fit(manifest: Manifest, found: Capabilities) -> None:
@@ -79,7 +79,7 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
         )
     if lam_max > 0 and not (found.lam_step > 0 and lam_max <= found.lam_max * (1 + 1e-6)):
         raise UnfitController(f"controller {found.name!r}: its lam ends at {found.lam_max:g}, {lam_max:g} is needed")
-    if Samples.most(found.channels, found.max_payload) < 1:
+    if SamplesMessage.most(found.channels, found.max_payload) < 1:
         raise UnfitController(f"controller {found.name!r}: one sample of {found.channels} channels fits no packet")
 
 
@@ -104,10 +104,10 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield Start(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
+    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
     waiting = merge(_links(manifest, found), _marks(manifest, found), key=lambda event: event.at)
     event = next(waiting, None)
-    most = Samples.most(found.channels, found.max_payload)
+    most = SamplesMessage.most(found.channels, found.max_payload)
     block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * manifest.rate_hz)))
     drives = [channel.index for channel in manifest.channels if channel.role is Role.DRIVE]
     shaper, first = Shaper(len(drives)), 0
@@ -118,7 +118,7 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
         codes = volts * (FULL_CODE / found.full_volts)
         codes[:, drives] = shaper.round(codes[:, drives].T).T
         codes = np.rint(codes).clip(-FULL_CODE, FULL_CODE)
-        yield Samples(first, codes.astype(np.int16))
+        yield SamplesMessage(first, codes.astype(np.int16))
         first += len(volts)
     yield End(first)
 

@@ -19,7 +19,7 @@ from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
 from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
-from .messages import FULL_CODE, Codes, LinkCoupling, Mark, Start
+from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
 __all__ = ["ArrivalRecorder", "CutShort", "frame_note", "scene_note"]
@@ -100,7 +100,7 @@ class ArrivalRecorder:
         self.finished = 0
         self.cut_short: CutShort | None = None
 
-    def start(self, start: Start) -> None:
+    def start(self, start: StartMessage) -> None:
         """A session begins; one that was not finished is cut short."""
         self.cut()
         self._total = start.total

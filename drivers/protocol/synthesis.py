@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .messages import Tone
+from .messages import WireTone
 
 __all__ = ["Glide", "ToneMix"]
 
@@ -49,14 +49,14 @@ class Glide:
 class ToneMix:
     """Sets of tones, each with its weight: the newest rises to 1 while those before it fall to 0."""
 
-    sets: list[tuple[tuple[Tone, ...], Glide]] = field(default_factory=list)
+    sets: list[tuple[tuple[WireTone, ...], Glide]] = field(default_factory=list)
 
     @property
     def any(self) -> bool:
         """Whether anything sounds."""
         return bool(self.sets)
 
-    def change(self, start: int, ramp: int, tones: tuple[Tone, ...]) -> None:
+    def change(self, start: int, ramp: int, tones: tuple[WireTone, ...]) -> None:
         """From sample `start` fade to `tones` over `ramp` samples."""
         here = np.array([start])
         fading = [(old, weight.then(start, ramp, [0.0])) for old, weight in self.sets if weight.at(here)[0, 0] > 0]

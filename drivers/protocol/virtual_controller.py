@@ -22,8 +22,8 @@ from .messages import (
     LinkCoupling,
     Mark,
     Refused,
-    Samples,
-    Start,
+    SamplesMessage,
+    StartMessage,
     State,
     Tones,
 )
@@ -38,7 +38,7 @@ ACK_EVERY_S = 0.02
 class Recorder(Protocol):
     """Keeps what arrives, in the order of the session."""
 
-    def start(self, start: Start) -> None:
+    def start(self, start: StartMessage) -> None:
         """A session begins."""
         ...
 
@@ -156,7 +156,7 @@ class VirtualController:
 
     def _take_ordered(self, packet: Packet) -> None:
         if packet.kind is Kind.START:
-            start = Start.of(packet)
+            start = StartMessage.of(packet)
             if packet.number != 0 or start.session in (0, self.session):
                 return
             self._try(packet.number, lambda: self._start(start))
@@ -180,7 +180,7 @@ class VirtualController:
         else:
             self._next = number + 1
 
-    def _start(self, start: Start) -> None:
+    def _start(self, start: StartMessage) -> None:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
         self.playout.begin(start.parametric)
@@ -200,7 +200,7 @@ class VirtualController:
             self._event(_event(packet))
 
     def _samples(self, packet: Packet) -> None:
-        samples = Samples.of(packet, self.spec.channels)
+        samples = SamplesMessage.of(packet, self.spec.channels)
         received = self.playout.received
         if samples is None:
             raise _Refusal(f"samples must be a whole number of {self.spec.channels} channels, and their count true")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .drv2667 import BoardRefusal
-from .serial_play import Line
+from .serial_play import SerialLine
 
 __all__ = ["BOARD_BAUD", "BoardEmulator", "Firmware", "grid_line", "play_grid_lines"]
 
@@ -126,7 +126,7 @@ class BoardEmulator:
 
 def play_grid_lines(
     lines: Iterable[tuple[float, bytes]],
-    line: Line,
+    line: SerialLine,
     *,
     silence: bytes,
     progress: Callable[[float], None] | None = None,

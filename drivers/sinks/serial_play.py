@@ -10,7 +10,7 @@ from typing import Protocol
 from ..protocol.host_session import STOP, HostSession
 from .uart import LinkLost, PortUnavailable
 
-__all__ = ["Line", "NoAnswer", "run_session"]
+__all__ = ["NoAnswer", "SerialLine", "run_session"]
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ class NoAnswer(LinkLost, TimeoutError):
     """
 
 
-class Line(Protocol):
+class SerialLine(Protocol):
     """Bytes to and from a controller."""
 
     def read(self, wait_s: float) -> bytes:
@@ -44,7 +44,7 @@ class Line(Protocol):
 
 def run_session(
     session: HostSession,
-    open_line: Callable[[], Line],
+    open_line: Callable[[], SerialLine],
     *,
     patience_s: float,
     progress: Callable[[float], None] | None = None,
@@ -71,7 +71,7 @@ def run_session(
         As the session raises them.
     """
     heard_at = clock()
-    line: Line | None = open_line()
+    line: SerialLine | None = open_line()
     try:
         while not session.finished:
             if line is None:
@@ -90,7 +90,7 @@ def run_session(
 
 
 def _converse(
-    session: HostSession, line: Line, heard_at: float, progress: Callable[[float], None] | None,
+    session: HostSession, line: SerialLine, heard_at: float, progress: Callable[[float], None] | None,
     clock: Callable[[], float],
 ) -> float:  # fmt: skip
     """Exchange bytes until the session ends or the line breaks; returns when the controller was last heard."""
@@ -115,7 +115,7 @@ def _converse(
     return heard_at
 
 
-def _reopened(open_line: Callable[[], Line]) -> Line | None:
+def _reopened(open_line: Callable[[], SerialLine]) -> SerialLine | None:
     time.sleep(RETRY_S)
     try:
         return open_line()
@@ -123,7 +123,7 @@ def _reopened(open_line: Callable[[], Line]) -> Line | None:
         return None
 
 
-def _stop(line: Line, session: HostSession) -> None:
+def _stop(line: SerialLine, session: HostSession) -> None:
     try:
         if not session.finished:
             line.write(b"\0" + STOP * 3)

@@ -15,7 +15,8 @@ from ..channels import channels_of
 from ..errors import UnreadableWaveform
 from ..files.parts import Belongs
 from ..files.whole import atomic_files, check_plain, naming, settled
-from ..formats.samples import SUFFIXES, SampleReader, check_suffix, open_samples, writer_for
+from ..formats.samples import SampleReader, open_samples, writer_for
+from ..formats.table import SUFFIXES, check_suffix
 from ..formats.wav import Encoding
 from .limits import LimitCheck
 from .manifest import Manifest, ManifestWriter, digest_of_open
@@ -72,7 +73,7 @@ def write_waveform(
         When the ending of `path` stands for no format, or the file system refuses.
     """
     path = Path(path)
-    check_suffix(path)
+    check_suffix(path, SUFFIXES)
     manifest_path = path.with_suffix(".json")
     with (
         atomic_files(path, manifest_path, belongs=_belongs(path)) as (file, manifest_file),

@@ -16,7 +16,7 @@ from chainsim import Device, Outcome, complaint_of, shown, words_of
 from ..channels import Channel, Role
 from ..errors import UnreadableWaveform
 from ..files.whole import first_of_plain
-from ..formats.samples import SUFFIXES
+from ..formats.table import SUFFIXES
 from .coupling import CouplingEvent
 from .manifest import MOST_BYTES, FrameMark, Manifest
 

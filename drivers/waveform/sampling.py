@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from planner import DriveTone, FirstOrderHold, FramePlan, OperatingPoint, Plan, 
 
 from ..channels import Channel, Role, channels_of
 from .shaping import Shaper
-from .timeline import Stretch, stretches
+from .timeline import PlacedFrame, stretches
 
 __all__ = ["Waveform"]
 
@@ -22,6 +23,7 @@ Complexes = NDArray[np.complex128]
 
 # Samples of all channels computed at once: about a megabyte of float64, which stays in the cache.
 CHUNK_VALUES = 1 << 17
+BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,31 @@ class Waveform:
     def rate_hz(self) -> int:
         """Samples per second and channel."""
         return self.device.amplifier.rate_hz
+
+    def samples(self, start_s: float, stop_s: float) -> Floats:
+        """The samples from `start_s` until before `stop_s`; what lies before is computed too.
+
+        Returns
+        -------
+        float64, shape (S, channels), volts; fewer where the plan ends earlier.
+
+        Raises
+        ------
+        ValueError
+            When the times do not rise from 0.
+        WaveformError
+            As `blocks`.
+        """
+        if not 0 <= start_s <= stop_s:
+            raise ValueError(f"samples: expected times that rise from 0, got {start_s} to {stop_s}")
+        first, stop = (math.ceil(time_s * self.rate_hz - 1e-6) for time_s in (start_s, stop_s))
+        pieces, position = [np.empty((0, len(self.channels)))], 0
+        for block in self.blocks(BLOCK):
+            if position >= stop:
+                break
+            pieces.append(block[max(0, first - position) : stop - position])
+            position += len(block)
+        return np.concatenate(pieces)
 
     def blocks(self, block: int) -> Iterator[Floats]:
         """The samples from the start, `block` at a time; the last block may be shorter.
@@ -106,7 +133,7 @@ class Waveform:
                     chunk *= step
                 yield chunk
 
-    def _chunk(self, stretch: Stretch, index: NDArray[np.intp]) -> Floats:
+    def _chunk(self, stretch: PlacedFrame, index: NDArray[np.intp]) -> Floats:
         frame, device = stretch.plan, self.device
         time_s = index / self.rate_hz
         since_s = time_s - frame.start_s

@@ -13,11 +13,11 @@ from planner import FramePlan, OperatingPoint, Ramp
 
 from ..errors import WaveformError
 
-__all__ = ["Stretch", "stretches"]
+__all__ = ["PlacedFrame", "stretches"]
 
 
 @dataclass(frozen=True)
-class Stretch:
+class PlacedFrame:
     """A frame and its samples `first` to `stop` (excluded), counted from the start of the waveform."""
 
     plan: FramePlan
@@ -25,7 +25,7 @@ class Stretch:
     stop: int
 
 
-def stretches(device: Device, frames: Iterable[FramePlan]) -> Iterator[Stretch]:
+def stretches(device: Device, frames: Iterable[FramePlan]) -> Iterator[PlacedFrame]:
     """Check `frames` and place them at round(start_s * rate), lazily.
 
     Raises
@@ -45,7 +45,7 @@ def stretches(device: Device, frames: Iterable[FramePlan]) -> Iterator[Stretch]:
                 "the first frame starts at 0 and each next one where the last ends"
             )
         _check_chains(place, device, frame)
-        yield Stretch(frame, first, stop)
+        yield PlacedFrame(frame, first, stop)
         joint = stop
 
 

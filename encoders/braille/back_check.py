@@ -14,12 +14,13 @@ from typing import Any
 from ..errors import TableMissing
 from . import louis_binding
 from .alphabet import alphabet
+from .choices import Undefined
 from .dots import BLANK, LOWER_SIX
 from .layout import join_pages
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
 from .transcribe import Transcriber, translate
-from .undefined import Undefined, writable
+from .undefined import writable
 
 __all__ = ["BackCheck", "Difference", "back_check", "back_translate", "covered_text"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -12,48 +11,37 @@ from numpy.typing import NDArray
 
 from ..errors import LayoutError
 from ..scene import TargetPattern
+from .choices import Presentation
 from .dots import blocks
 from .layout import Layout
 
-__all__ = ["MIN_PART_S", "Presentation", "Shown", "presenter", "read_cells"]
+__all__ = ["MIN_PART_S", "ShownPage", "presenter", "read_cells"]
 
 MIN_PART_S = 0.6
 """A part of a page lasts at least this long: up to 0.35 s of ramp, and 0.25 s to feel it."""
 _CACHE_BYTES = 16_000_000
 
 
-class Presentation(StrEnum):
-    """Order in which the dots of a page are shown.
-
-    ``together``: all at once. ``by-row``: one row of the grid after another, from the top. ``by-dot``: in
-    all cells dot 1, then dot 2, and so on. Parts without a dot are left out.
-    """
-
-    TOGETHER = "together"
-    BY_ROW = "by-row"
-    BY_DOT = "by-dot"
-
-
-class Shown(NamedTuple):
+class ShownPage(NamedTuple):
     """A page ready to be shown: its `cells` as lines, and its patterns one after another."""
 
     cells: str
     parts: tuple[TargetPattern, ...]
 
 
-def presenter(layout: Layout, presentation: Presentation) -> Callable[[str], Shown]:
+def presenter(layout: Layout, presentation: Presentation) -> Callable[[str], ShownPage]:
     """A function from a page of cells (lines run together) to what is shown; it remembers recent pages."""
     places = _places(layout)
     dots_of = blocks(layout.height)
     shape = (layout.shape.rows, layout.shape.cols)
     width = layout.cells_per_line
 
-    def show(page: str) -> Shown:
+    def show(page: str) -> ShownPage:
         codes = np.frombuffer(page.encode("utf-16-le"), dtype="<u2") & 0xFF
         grid = np.zeros(shape, dtype=np.complex128)
         grid.reshape(-1)[places] = dots_of[codes]
         lines = "\n".join(page[at : at + width] for at in range(0, len(page), width))
-        return Shown(lines, tuple(_pattern(part) for part in _parts(grid, places, presentation)))
+        return ShownPage(lines, tuple(_pattern(part) for part in _parts(grid, places, presentation)))
 
     size = 16 * shape[0] * shape[1] * (1 if presentation is Presentation.TOGETHER else layout.height * layout.lines)
     return lru_cache(maxsize=max(16, min(4096, _CACHE_BYTES // size)))(show)

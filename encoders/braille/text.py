@@ -14,20 +14,23 @@ from ..scene import Frame, GridShape, Scene, TargetPattern
 from . import louis_binding
 from .alphabet import alphabet
 from .back_check import BackCheck, back_check
+from .choices import Presentation, Undefined
 from .dots import BLANK, HIGHEST_6_DOT
 from .layout import Layout, PlacedWord, paginate
-from .presentation import MIN_PART_S, Presentation, presenter, read_cells
+from .presentation import MIN_PART_S, presenter, read_cells
 from .readers.sources import SourceKind, TextSource
 from .report import EncodingReport, ReportLog, Split
 from .tables import resolve_tables, table_dots
 from .transcribe import PARAGRAPH_END, Transcriber
-from .undefined import Undefined, writable
+from .undefined import writable
 
 __all__ = ["TextFrames", "TextOptions", "TextScene", "encode_text"]
 
 DEFAULT_RATE = 6.0
 SHORT_PAGE_S = 1.0
 """A page with few cells lasts as long as it would with more, up to this."""
+MOST_KEPT = 1 << 18
+"""Actuators of all frames of a text together, up to which its frames are kept: 7281 frames of 6 x 6, some 10 MB."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,13 @@ class TextOptions:
     presentation : dots together, by row, or by dot.
     blank_between : a blank frame between paragraphs.
     dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
+
+    A choice may be given as its word.
+
+    Raises
+    ------
+    LayoutError
+        When a word is not one of its choices.
     """
 
     table: str = "en-ueb-g2.ctb"
@@ -58,8 +68,15 @@ class TextOptions:
     blank_between: bool = False
     dots: int | None = None
 
+    def __post_init__(self) -> None:
+        for name, kind in (("undefined", Undefined), ("presentation", Presentation)):
+            given = getattr(self, name)
+            if given not in list(kind):
+                raise LayoutError(f"{name}: expected one of {', '.join(kind)}, got {given!r}")
+            object.__setattr__(self, name, kind(given))
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class TextScene(Scene):
     """A scene of Braille; `text_frames` are its frames with their report and check."""
 
@@ -158,9 +175,10 @@ def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
 
 
 class TextFrames:
-    """The frames of a text: iterating encodes, iterating again encodes again.
+    """The frames of a text: iterating encodes, and keeps the frames of a text that is not long.
 
-    `report` tells what happened in the last iteration, complete when it came to its end.
+    A text whose frames have more than `MOST_KEPT` actuators together is encoded again by every iteration. `report`
+    tells what happened while it was encoded last, complete when that came to its end.
     """
 
     def __init__(
@@ -177,6 +195,7 @@ class TextFrames:
         self._options = options
         self._encoding = encoding
         self._log = ReportLog()
+        self._kept: tuple[Frame, ...] | None = None
         self._show = presenter(layout, options.presentation)
         rate = options.rate or DEFAULT_RATE
         self._s_per_cell = 0.0 if options.dwell_s else 1 / rate
@@ -188,6 +207,20 @@ class TextFrames:
         return self._log.report
 
     def __iter__(self) -> Iterator[Frame]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept: list[Frame] | None = []
+        most = MOST_KEPT // (self.layout.shape.rows * self.layout.shape.cols)
+        for number, frame in enumerate(self._encoded(), 1):
+            if number > most:
+                kept = None
+            if kept is not None:
+                kept.append(frame)
+            yield frame
+        self._kept = None if kept is None else tuple(kept)
+
+    def _encoded(self) -> Iterator[Frame]:
         self._log = log = ReportLog()
         text, show = self.source.text, self._show
         between = False
@@ -230,7 +263,8 @@ class TextFrames:
     def check(self) -> BackCheck:
         """Read all frames as fingers would, back-translate, and compare with the source.
 
-        Holds the whole text and its cells at once; for the frames of a book use it on a part.
+        Holds the whole text and its cells at once; for the frames of a book use it on a part. What the frames of a
+        text that is not long were encoded for before serves here too.
         """
         pages: list[str] = []
         felt: np.ndarray[Any, np.dtype[np.bool_]] | None = None

@@ -10,12 +10,13 @@ from functools import lru_cache
 from ..errors import TableMissing
 from . import louis_binding
 from .alphabet import alphabet
+from .choices import Undefined
 from .dots import BLANK, HIGHEST_6_DOT, LOWER_SIX
 from .layout import PlacedWord
 from .readers.sources import SourceKind, TextSource
 from .report import ReportLog
 from .tables import hyphenation_tables
-from .undefined import ZERO_WIDTH_JOINER, Undefined, extends, writable
+from .undefined import ZERO_WIDTH_JOINER, extends, writable
 
 __all__ = ["PARAGRAPH_END", "Transcriber", "Translation", "translate"]
 

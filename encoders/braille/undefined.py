@@ -10,22 +10,14 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cache
 
 from ..errors import UndefinedCharacter
 from .alphabet import Alphabet
+from .choices import Undefined
 from .report import ReportLog
 
-__all__ = ["Undefined", "Writable", "extends", "name_of", "writable"]
-
-
-class Undefined(StrEnum):
-    """What becomes of a character the table cannot write: its name in words, nothing, or an error."""
-
-    NAME = "name"
-    DROP = "drop"
-    ERROR = "error"
+__all__ = ["Writable", "extends", "name_of", "writable"]
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ class PictureReport:
         return sum(frame.similarity for frame in self.frames) / len(self.frames)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PictureScene(Scene):
     """A scene made of a picture, with its report; `frames` is a tuple."""
 

@@ -1,0 +1,37 @@
+from .api.chains import (
+    solve as solve,
+    sweep as sweep,
+)
+from .api.felt import (
+    Felt as Felt,
+    verify as verify,
+)
+from .api.plans import (
+    PlanWaveform as PlanWaveform,
+    ScenePlan as ScenePlan,
+    plan as plan,
+)
+from .api.scenes import (
+    device as device,
+    icons as icons,
+    image as image,
+    job as job,
+    text as text,
+    texture as texture,
+)
+from .api.types import (
+    Chain as Chain,
+    ChainError as ChainError,
+    Device as Device,
+    DriverError as DriverError,
+    EncodeError as EncodeError,
+    FramePlan as FramePlan,
+    Outcome as Outcome,
+    PlanError as PlanError,
+    Scene as Scene,
+    Setting as Setting,
+)
+from .errors import (
+    AppError as AppError,
+    NotMade as NotMade,
+)

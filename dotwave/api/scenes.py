@@ -1,0 +1,294 @@
+"""What should be felt, on which device: texts, pictures, icons, textures and jobs as scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from chainsim import Device, complaint_of, load_device, words_of
+from encoders import (
+    GridShape,
+    PictureOptions,
+    Scene,
+    Style,
+    TargetPattern,
+    TextOptions,
+    TextScene,
+    TextSource,
+)  # fmt: skip
+
+from ..errors import AppError
+from ..scenes import joined, picture_scene, pitched, still_scene, text_scene
+
+__all__ = ["device", "icons", "image", "job", "text", "texture"]
+
+AnyDevice = Device | str | PathLike[str] | Mapping[str, Any]
+Model = TypeVar("Model", bound=BaseModel)
+Picture = str | PathLike[str] | bytes
+USUAL_DEVICE = "paper-6x6"
+
+
+def device(name: AnyDevice = USUAL_DEVICE) -> Device:
+    """The hardware as built.
+
+    Parameters
+    ----------
+    name : str, path, mapping or Device
+        A built-in profile's name, a YAML file, or a mapping with a `base` and what is different from it, as the
+        section `device` of a job file has it. A `Device` is given back as it is.
+
+    Returns
+    -------
+    chainsim.Device
+        With `rows`, `cols`, `f0_hz` and so on; frozen.
+
+    Raises
+    ------
+    chainsim.ChainError, dotwave.AppError
+        When there is no such profile or file, or what is given contradicts itself.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> dw.device("linked-6x6").rows
+    6
+    >>> wide = dw.device({"base": "paper-6x6", "grid": {"cols": 8}})
+    >>> wide.rows, wide.cols
+    (6, 8)
+    """
+    if isinstance(name, Device):
+        return name
+    if isinstance(name, Mapping):
+        from ..jobs.job import DevicePart
+
+        return _checked(DevicePart, name, "device").device(Path())
+    return load_device(str(name))
+
+
+def text(
+    source: str | PathLike[str] | TextSource,
+    device: AnyDevice = USUAL_DEVICE,
+    options: TextOptions | None = None,
+    **changes: Any,
+) -> TextScene:
+    """A text as Braille, page by page.
+
+    The text is encoded as its frames are drawn; a long one is never held whole.
+
+    Parameters
+    ----------
+    source : str, path or encoders.TextSource
+        The words themselves, or the path (`pathlib.Path`) of a text file: UTF-8, Unicode Braille or BRF.
+    device : Device, name, file or mapping
+        Whose grid the pages are laid out for, as `dotwave.device` takes it.
+    options : encoders.TextOptions, optional
+        Table, layout, reading rate and so on.
+    **changes
+        Single options by their names in `encoders.TextOptions`, such as ``table="language:de grade:2"``.
+
+    Returns
+    -------
+    encoders.TextScene
+        Iterate its `frames`; each has a `pattern`, `cells`, the `text` it shows and `dwell_s` in seconds.
+
+    Raises
+    ------
+    encoders.EncodeError
+        When there is nothing to show, or the table or the grid will not do.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> scene = dw.text("Hello world", "linked-6x6")
+    >>> [frame.text for frame in scene.frames]
+    ['Hello', 'world']
+    """
+    profile = _device(device)
+    given = source if isinstance(source, TextSource) else _source(source)
+    return text_scene(given, _shape(profile), replace(options or TextOptions(), **changes))
+
+
+def image(
+    files: Picture | Iterable[Picture],
+    device: AnyDevice = USUAL_DEVICE,
+    options: PictureOptions | None = None,
+    **changes: Any,
+) -> Scene:
+    """Pictures, one after another.
+
+    Parameters
+    ----------
+    files : path or bytes, or several
+        PNG, JPEG, GIF, WebP, BMP, TIFF or SVG.
+    device : Device, name, file or mapping
+        Whose grid and pitch the pictures are made for.
+    options : encoders.PictureOptions, optional
+        Style, fit, threshold and so on; the pitch is the device's.
+    **changes
+        Single options by their names in `encoders.PictureOptions`, such as ``style="photo"``.
+
+    Returns
+    -------
+    encoders.Scene
+        With a line on each picture in `parts`.
+
+    Raises
+    ------
+    encoders.EncodeError
+        When a picture cannot be read, or an option is out of range.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> dw.image("samples/icons/heart.svg").parts
+    ('icon: heart.svg, similarity 0.88',)
+    """
+    profile = _device(device)
+    chosen = pitched(replace(options or PictureOptions(), **changes), profile)
+    several = [files] if isinstance(files, str | bytes | PathLike) else list(files)
+    if not several:
+        raise AppError("image: no picture was given; give at least one")
+    shape = _shape(profile)
+    return joined([picture_scene(_picture(one), shape, chosen) for one in several], shape)
+
+
+def icons(
+    sources: str | PathLike[str] | Iterable[str | PathLike[str]], device: AnyDevice = USUAL_DEVICE, **changes: Any
+) -> Scene:
+    """All icons of folders, globs, zip and tar archives, one after another, sorted by name.
+
+    `dotwave icons` makes sets of them that are told apart, and their pages; this shows each as its best pattern.
+
+    Parameters
+    ----------
+    sources : path, or several
+        Folders, globs, single pictures, archives.
+    device : Device, name, file or mapping
+        Whose grid and pitch the icons are made for.
+    **changes
+        Single options by their names in `encoders.PictureOptions`; the style is ``icon``.
+
+    Returns
+    -------
+    encoders.Scene
+        With a line on each icon in `parts`.
+
+    Raises
+    ------
+    dotwave.AppError, encoders.EncodeError
+        When there is no picture, or one of them cannot be used.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> scene = dw.icons("samples/icons/[hl]*.svg")
+    >>> len(list(scene.frames)) == len(scene.parts)
+    True
+    """
+    from ..icon_sets.sources import find_icons, read_icons
+
+    several = [sources] if isinstance(sources, str | PathLike) else list(sources)
+    files = list(read_icons(find_icons([str(one) for one in several])))
+    for file in files:
+        if file.error:
+            raise AppError(f"{file.name}: {file.error}")
+    scene = image([file.data for file in files], device, **{"style": Style.ICON} | changes)
+    words = (f"icon: {file.name},{part.partition(',')[2]}" for file, part in zip(files, scene.parts, strict=True))
+    return replace(scene, parts=tuple(words))
+
+
+def texture(
+    kind: Mapping[str, Any] | TargetPattern, device: AnyDevice = USUAL_DEVICE, *, dwell_s: float = 2.0
+) -> Scene:
+    """One pattern: a wave, bars, walking bars, levels, or regions of them.
+
+    Parameters
+    ----------
+    kind : mapping or encoders.TargetPattern
+        As the key `texture` of a job file: ``{"wave": {"lag_deg": 60}}``, ``{"bars": {"width": 1, "gap": 1}}``,
+        ``{"walking_bars": {"rate_hz": 3}}``, ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row).
+    device : Device, name, file or mapping
+        Whose grid it covers.
+    dwell_s : float
+        Seconds it is felt.
+
+    Returns
+    -------
+    encoders.Scene
+        Of one frame.
+
+    Raises
+    ------
+    dotwave.AppError, encoders.EncodeError
+        When there is no such texture, or it does not fit the grid.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> dw.texture({"bars": {"width": 1, "gap": 1}}).parts
+    ('texture: bars',)
+    """
+    if isinstance(kind, TargetPattern):
+        return still_scene(kind, dwell_s, "texture")
+    from ..jobs.texture import TexturePart
+
+    part = _checked(TexturePart, dict(kind) | {"dwell_s": dwell_s}, "texture")
+    return still_scene(part.target(_shape(_device(device))), part.dwell_s, f"texture: {part.kind}")
+
+
+def job(path: str | PathLike[str]) -> Scene:
+    """A job file: texts, pictures, textures and pauses, on its own device and with its own tolerance.
+
+    Parameters
+    ----------
+    path : path
+        Of the YAML file; `dotwave schema` prints what may stand in it.
+
+    Returns
+    -------
+    encoders.Scene
+        Which `dotwave.plan` plans on its `device` when no other is given.
+
+    Raises
+    ------
+    dotwave.AppError, chainsim.ChainError, encoders.EncodeError
+        When the job, or what it names, cannot be used; the message says in which line.
+
+    Examples
+    --------
+    >>> import dotwave as dw
+    >>> dw.job("samples/jobs/mixed.yaml").device.name
+    'wide'
+    """
+    from ..jobs.scene import read_job_scene
+
+    return read_job_scene(Path(path))
+
+
+_device = device
+
+
+def _checked(model: type[Model], given: Mapping[str, Any], what: str) -> Model:
+    try:
+        return model.model_validate(dict(given))
+    except ValidationError as error:
+        complaint = complaint_of(error)
+        place = ".".join(filter(None, (what, words_of(complaint.place) if complaint.place else "")))
+        raise AppError(f"{place}: {complaint.sentence}") from None
+
+
+def _shape(profile: Device) -> GridShape:
+    return GridShape(profile.rows, profile.cols)
+
+
+def _source(source: str | PathLike[str]) -> TextSource:
+    return TextSource.of_text(source) if isinstance(source, str) else TextSource.of_path(Path(source))
+
+
+def _picture(source: Picture) -> Path | bytes:
+    return source if isinstance(source, bytes) else Path(source)

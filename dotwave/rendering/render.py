@@ -1,0 +1,172 @@
+"""The one way from a scene to what is written and said: plan every frame, write what can be made, say what cannot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from chainsim import Device, Outcome
+from drivers import FORMATS, FileError, WrittenPlan, check_suffix, write_plan
+from encoders import Scene, TextScene
+from planner import FramePlan, Plan, PlanError, plan_scene
+
+from ..errors import AppError
+from ..jobs.scene import JobScene, read_job_scene
+from ..progress import progress
+from ..reports.report import Report
+from ..reports.scene import SceneReport
+from ..reports.text import TextReport
+from ..reports.totals import Totals, nearest_lines
+from ..request import Request
+from ..studies.judge import Judge
+from .extent import extent_of, go_on
+from .text_findings import text_findings
+
+__all__ = ["render", "render_job"]
+
+
+class _Stopped(Exception):
+    """A frame cannot be made as asked and there is nothing to write, or no time is left."""
+
+
+def render(scene: Scene, device: Device, out: Path | None = None, request: Request | None = None) -> Report:
+    """Plan `scene` on `device` and, with `out`, write it.
+
+    Nothing is written when a frame cannot be made as asked: the report then says what is lacking and what the nearest
+    pattern is.
+
+    Parameters
+    ----------
+    out : samples or a haptic file, as its ending says (`drivers.FORMATS`); None to plan only.
+
+    Raises
+    ------
+    Declined
+        When a person was asked whether to write very much, and said no.
+    AppError, DriverError, EncodeError, PlanError
+        When the scene does not fit the device, or the disk has no room or refuses.
+    """
+    began = time.perf_counter()
+    request = request or Request()
+    plan = plan_scene(scene, device, contrast_db=request.contrast_db)
+    if out is not None and FORMATS[check_suffix(out)].sample_bytes:
+        go_on(extent_of(scene.frames, device, out, request.encoding), out, yes=request.yes)
+    passage = _Passage(plan, Judge(request), writes=out is not None)
+    try:
+        written = _carried_out(passage, out, request)
+    except PlanError as error:
+        if not isinstance(scene, JobScene):
+            raise
+        raise scene.placed(error) from None
+    report = _report(scene, passage, written, request)
+    found = passage.judge.findings()
+    seconds = time.perf_counter() - began
+    return replace(report, reached=found.reached, met=found.met, beside=found.beside, seconds=seconds)
+
+
+def render_job(
+    path: Path, out: Path | None = None, request: Request | None = None, *, root: Path | None = None
+) -> Report:
+    """Carry out the job file `path`; `out` is written in place of the job's own output.
+
+    Parameters
+    ----------
+    request : what is asked, before what the job asks for.
+    root : the job, and what it names, lie below this folder, or are refused; None for anywhere.
+
+    Raises
+    ------
+    Declined
+        When a person was asked, and said no.
+    AppError, ChainError, DriverError, EncodeError, PlanError
+        When the job, or what it names, cannot be used.
+    """
+    began = time.perf_counter()
+    job = read_job_scene(path, root=root)
+    try:
+        report = render(job, job.device, out or job.out, job.request(request or Request()))
+    except FileError as error:
+        if out is not None:
+            raise
+        raise AppError(f"{job.located.at('output')}: {error}") from None
+    return replace(report, seconds=time.perf_counter() - began)
+
+
+def _carried_out(passage: _Passage, out: Path | None, request: Request) -> WrittenPlan | None:
+    """Draw all frames; what was written, None where nothing was to be or a frame cannot be made."""
+    with progress("rendering") as update:
+        try:
+            if out is not None:
+                plan = replace(passage.plan, frames=passage)
+                return write_plan(plan, out, encoding=request.encoding, actuator=request.actuator, progress=update)
+            for frame in passage:
+                update(frame.end_s)
+        except _Stopped:
+            pass
+    return None
+
+
+@dataclass
+class _Passage:
+    """The plan's frames passed through, judged, and what is to be said of them."""
+
+    plan: Plan
+    judge: Judge
+    writes: bool
+    totals: Totals = field(default_factory=Totals)
+    walks: dict[str, int] = field(default_factory=dict)
+    failure: tuple[str, ...] = ()
+
+    def __iter__(self) -> Iterator[FramePlan]:
+        for number, frame in enumerate(self.judge.judged(self.plan), 1):
+            self.totals.add(frame)
+            if frame.outcome is not Outcome.OK:
+                self._failed(number, frame)
+            elif any(state.tones for state in frame.states):
+                self.walks.setdefault(self._pace(frame), number)
+            yield frame
+
+    def notes(self) -> Iterator[str]:
+        """A line for every pace, with the first frame that has it; then what is lacking for the first that failed."""
+        for pace, number in self.walks.items():
+            yield f"Frame {number}: {pace} bars a second walk past an actuator."
+        yield from self.failure
+
+    def _pace(self, frame: FramePlan) -> str:
+        """The slowest and the quickest walk of a frame, bars a second."""
+        from planner import walking_rate_hz
+
+        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.tones)
+        ends = [f"{rates[0]:.3g}", f"{rates[-1]:.3g}"]
+        return " to ".join(dict.fromkeys(ends))
+
+    def _failed(self, number: int, frame: FramePlan) -> None:
+        late = frame.outcome is Outcome.OUT_OF_BUDGET
+        if not self.failure:
+            nearest = () if late else nearest_lines(frame, self.plan.device)
+            end = ("Nothing was written.",) if self.writes else ()
+            self.failure = (f"Frame {number}: {frame.note}", *nearest, *end)
+        if self.writes or late:
+            raise _Stopped
+
+
+def _report(scene: Scene, passage: _Passage, written: WrittenPlan | None, request: Request) -> Report:
+    device, totals = passage.plan.device, passage.totals
+    peak = totals.volts * device.amplifier.volts
+    said: dict[str, Any] = totals.of_report() | {
+        "device": device.name,
+        "files": () if written is None else tuple(map(str, written.files)),
+        "peak_volts": peak if written is None or written.peak_volts is None else written.peak_volts,
+        "limit_volts": device.amplifier.volts,
+    }
+    if isinstance(scene, TextScene):
+        found = text_findings(scene)
+        notes = (*found.notes, *passage.notes())
+        return TextReport(
+            tables=tuple(scene.encoding["tables"]), text=scene.text_frames.source.text[:200], pages=totals.pages,
+            undefined=found.undefined, split=found.split, differences=found.differences, notes=notes, **said,
+        )  # fmt: skip
+    return SceneReport(parts=scene.parts, tolerance=request.tol, notes=tuple(passage.notes()), **said)

@@ -1,0 +1,55 @@
+"""What happened to a text on its way to cells, in words: what was left out or split, and what comes back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from encoders import EncodingReport, TextFrames, TextScene
+
+__all__ = ["TextFindings", "text_findings"]
+
+# Back-translation holds the whole text and its cells at once.
+MOST_CHECKED = 100_000
+
+
+@dataclass(frozen=True)
+class TextFindings:
+    """Sentences on a text: characters shown otherwise, words split, what does not come back, and notes."""
+
+    undefined: tuple[str, ...]
+    split: tuple[str, ...]
+    differences: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def text_findings(scene: TextScene) -> TextFindings:
+    """What is to be said of a text whose frames were drawn."""
+    encoded = scene.text_frames.report
+    differences, sentence = _back_check(scene.text_frames)
+    more = (f"{encoded.split_total} words were split; the first {len(encoded.splits)} are listed.",)
+    return TextFindings(
+        undefined=_undefined(encoded),
+        split=tuple(
+            f"{split.word!r} at character {split.span[0]}, page {split.page + 1}, "
+            + ("hyphenated" if split.hyphenated else "at the last cell")
+            for split in encoded.splits
+        ),
+        differences=differences,
+        notes=(sentence, *(more if encoded.split_total > len(encoded.splits) else ())),
+    )
+
+
+def _undefined(encoded: EncodingReport) -> tuple[str, ...]:
+    return tuple(
+        f"{use.characters} ({use.count} times, first at character {use.first}): {use.action}"
+        + (f" as {use.written!r}" if use.written else "")
+        for use in encoded.undefined
+    )
+
+
+def _back_check(frames: TextFrames) -> tuple[tuple[str, ...], str]:
+    """What does not come back when the cells are translated back, and a sentence on it."""
+    if len(frames.source.text) > MOST_CHECKED:
+        return (), f"A text of more than {MOST_CHECKED} characters is not translated back here; verify does it."
+    check = frames.check()
+    return tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences), check.sentence
