@@ -122,7 +122,9 @@ def test_samples_that_change_after_the_check_stop_at_the_limit(tmp_path: Path, i
         with path.open("r+b") as file:
             file.seek(-42 * 4 * 1500, 2)
             file.write(np.full(42, 2.0, "<f4").tobytes())
-        with pytest.raises(GateRefusal, match=r"volts of channel 0 .* is 200 V at 0.3125 s"):
+        with pytest.raises(
+            GateRefusal, match=r"stopped, the samples have changed .*: volts of channel 0 .* is 200 V at 0.3125 s"
+        ):
             sink.play(manifest, reader)
     # Sample 2500 is in the third block.
     assert len(keeping.played) == 2

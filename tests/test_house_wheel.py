@@ -35,7 +35,7 @@ def test_wheel(tmp_path: Path) -> None:
         str(path.relative_to(source))
         for name in PACKAGES
         for path in (source / name).rglob("*")
-        if path.suffix in {".py", ".yaml", ".md", ".h"} or path.name == "py.typed"
+        if path.suffix in {".py", ".pyi", ".yaml", ".md", ".h"} or path.name == "py.typed"
     }
     assert {name for name in inside if ".dist-info" not in name} == wanted
     start = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); import dotwave; print(dotwave.__file__); "

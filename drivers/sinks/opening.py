@@ -22,6 +22,7 @@ __all__ = ["GROUP", "SINKS", "Checked", "OpenSink", "open_sink", "sink_names"]
 
 Progress = Callable[[float], None]
 
+CHANGED = "stopped, the samples have changed since they were checked"
 GROUP = "dotwave.sinks"
 """Entry points of this group in other packages are sinks: ``name = "module:maker"``."""
 
@@ -158,7 +159,7 @@ class _GatedSamples:
         return self._samples.samples
 
     def blocks(self, block: int) -> Iterator[NDArray[np.float64]]:
-        gate = Gate(self._limits, self._manifest.channels, self._manifest.rate_hz)
+        gate = Gate(self._limits, self._manifest.channels, self._manifest.rate_hz, refused=CHANGED)
         for volts in self._samples.blocks(block):
             gate.check(volts)
             yield volts
