@@ -114,7 +114,7 @@ class OpenSink:
         """
         self._passed = None
         gate = pass_gate(manifest, samples, self._limits_for(manifest), progress=progress)
-        checked = Checked(gate, self._sink.check(manifest, self._gated(manifest, samples)))
+        checked = Checked(gate, self._said(self._sink.check(manifest, self._gated(manifest, samples))))
         self._passed = manifest, samples
         return checked
 
@@ -129,7 +129,12 @@ class OpenSink:
         passed = self._passed
         if passed is None or passed[0] is not manifest or passed[1] is not samples:
             self.check(manifest, samples)
-        return self._sink.play(manifest, self._gated(manifest, samples), progress or _silent)
+        return self._said(self._sink.play(manifest, self._gated(manifest, samples), progress or _silent))
+
+    def _said(self, report: object) -> SinkReport:
+        if not isinstance(report, SinkReport):
+            raise SinkError(f"sink {self.name}: it gives no SinkReport but {report!r:.60}; {_cure(self.name)}")
+        return report
 
     def _limits_for(self, manifest: Manifest) -> GateLimits:
         return self._limits or GateLimits.of(manifest.device, len(manifest.channels))
