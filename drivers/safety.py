@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 BLOCK = 4096
 ROUND_OFF = 1e-6  # a file of float32 or 24-bit samples rounds what was planned for exactly the limit
 WINDOW_PARTS = 4
+REFUSED = "refused, nothing was sent"
 
 
 @dataclass(frozen=True)
@@ -111,9 +112,13 @@ class Gate:
     Parameters
     ----------
     limits : what must not be exceeded. channels : what each column is. rate_hz : samples per second.
+    refused : how a refusal begins.
     """
 
-    def __init__(self, limits: GateLimits, channels: Sequence[Channel], rate_hz: int) -> None:
+    def __init__(
+        self, limits: GateLimits, channels: Sequence[Channel], rate_hz: int, *, refused: str = REFUSED
+    ) -> None:
+        self._refused = refused
         self._limits = limits
         self._channels = channels
         self._rate = rate_hz
@@ -194,7 +199,7 @@ class Gate:
         place = "all channels" if quantity == "supply" else str(self._channels[channel])
         time_s = (self._done + sample) / self._rate
         raise GateRefusal(
-            f"refused, nothing was sent: {quantity} of {place} is {value:.4g} {unit} at {time_s:.6g} s; "
+            f"{self._refused}: {quantity} of {place} is {value:.4g} {unit} at {time_s:.6g} s; "
             f"the limit is {limit:.4g} {unit}; {CURES[quantity]}",
             quantity=quantity, channel=-1 if quantity == "supply" else channel, time_s=time_s, value=value,
             limit=limit,
@@ -231,7 +236,7 @@ def pass_gate(
         worst = max(event.lam, key=abs, default=0.0)
         if not 0 <= worst <= limits.lam_max * (1 + ROUND_OFF):
             raise GateRefusal(
-                f"refused, nothing was sent: lam of row {event.row} is {worst:.4g} at {event.t_s:.6g} s; "
+                f"{REFUSED}: lam of row {event.row} is {worst:.4g} at {event.t_s:.6g} s; "
                 f"the limit is {limits.lam_max:.4g}; plan for the device that is connected",
                 quantity="lam", channel=event.row, time_s=event.t_s, value=worst, limit=limits.lam_max,
             )  # fmt: skip

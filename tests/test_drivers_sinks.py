@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 
 from chainsim import load_device
-from drivers import GateLimits, GateRefusal, SinkError, WavWriter, channels_of, open_sink, read_waveform, sink_names
+from drivers import (
+    GateLimits,
+    GateRefusal,
+    SinkError,
+    SinkReport,
+    WavWriter,
+    channels_of,
+    open_sink,
+    read_waveform,
+    sink_names,
+)
 from drivers.sinks.opening import SINKS
 from drivers.waveform.manifest import digest_of
 
@@ -122,7 +132,9 @@ def test_samples_that_change_after_the_check_stop_at_the_limit(tmp_path: Path, i
         with path.open("r+b") as file:
             file.seek(-42 * 4 * 1500, 2)
             file.write(np.full(42, 2.0, "<f4").tobytes())
-        with pytest.raises(GateRefusal, match=r"volts of channel 0 .* is 200 V at 0.3125 s"):
+        with pytest.raises(
+            GateRefusal, match=r"stopped, the samples have changed .*: volts of channel 0 .* is 200 V at 0.3125 s"
+        ):
             sink.play(manifest, reader)
     # Sample 2500 is in the third block.
     assert len(keeping.played) == 2
@@ -163,6 +175,19 @@ def test_a_broken_package_is_one_line(
     assert (ended.code, ended.out, ended.err.count("\n")) == (2, "", 1)
 
 
+def test_a_sink_that_reports_nothing_is_one_line(tmp_path: Path, install: Callable[..., None]) -> None:
+    install(
+        "silent",
+        "class Sink:\n    def __init__(self, place): ...\n    check = play = close = lambda *_: None",
+        mine="silent:Sink",
+    )
+    with (
+        open_sink("mine:") as sink,
+        pytest.raises(SinkError, match="sink mine: it gives no SinkReport but None; reinstall"),
+    ):
+        sink.check(*read_waveform(written(tmp_path)))
+
+
 def test_a_name_that_is_offered_twice_is_refused(install: Callable[..., None]) -> None:
     install("keeping", KEEPER, controller="keeping:Keeper", keeper="keeping:Keeper")
     install("keeping_too", KEEPER, keeper="keeping_too:Keeper")
@@ -189,6 +214,6 @@ def test_a_sink_is_made_without_its_hardware(name: str) -> None:
 @pytest.mark.parametrize("name", ["controller", "drv2667"])
 def test_a_port_is_asked_for(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.sinks.board.plan_board", lambda *_: None)
-    monkeypatch.setattr("drivers.sinks.board._said", lambda *_: None)
+    monkeypatch.setattr("drivers.sinks.board._said", lambda *_: SinkReport())
     with open_sink(f"{name}:") as sink, pytest.raises(SinkError, match=f"as in {name}:/dev/tty"):
         sink.play(*read_waveform(written(tmp_path)))

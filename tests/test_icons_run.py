@@ -20,6 +20,7 @@ import pytest
 from PIL import Image
 
 from dotwave.errors import AppError
+from dotwave.icon_sets import work
 from dotwave.icon_sets.build import IconOptions, render_icons
 from dotwave.icon_sets.journal import Journal
 from dotwave.icon_sets.pool import LocalPool
@@ -112,6 +113,17 @@ def test_a_second_run_works_on_nothing(done: Path) -> None:
     report = render_icons([str(SAMPLES)], done, ONE)
     assert report.worked == 0
     assert before == {name: (done / name).read_bytes() for name in OUTPUTS}
+
+
+@pytest.mark.parametrize("name", ["PLANS_VERSION", "PICTURES_VERSION", "WAVEFORMS_VERSION"])
+def test_what_another_version_made_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    (tmp_path / "icons").mkdir()
+    shutil.copy(SAMPLES / "heart.svg", tmp_path / "icons")
+    again = [str(tmp_path / "icons")], tmp_path / "out", ONE
+    assert [render_icons(*again).worked, render_icons(*again).worked] == [1, 0]
+    version = getattr(work, name)
+    monkeypatch.setattr(work, name, version + 1)
+    assert render_icons(*again).worked == 1
 
 
 def test_equal_pictures_are_told_apart_when_asked(tmp_path: Path) -> None:

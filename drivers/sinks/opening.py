@@ -22,6 +22,7 @@ __all__ = ["GROUP", "SINKS", "Checked", "OpenSink", "open_sink", "sink_names"]
 
 Progress = Callable[[float], None]
 
+CHANGED = "stopped, the samples have changed since they were checked"
 GROUP = "dotwave.sinks"
 """Entry points of this group in other packages are sinks: ``name = "module:maker"``."""
 
@@ -113,7 +114,7 @@ class OpenSink:
         """
         self._passed = None
         gate = pass_gate(manifest, samples, self._limits_for(manifest), progress=progress)
-        checked = Checked(gate, self._sink.check(manifest, self._gated(manifest, samples)))
+        checked = Checked(gate, self._said(self._sink.check(manifest, self._gated(manifest, samples))))
         self._passed = manifest, samples
         return checked
 
@@ -128,7 +129,12 @@ class OpenSink:
         passed = self._passed
         if passed is None or passed[0] is not manifest or passed[1] is not samples:
             self.check(manifest, samples)
-        return self._sink.play(manifest, self._gated(manifest, samples), progress or _silent)
+        return self._said(self._sink.play(manifest, self._gated(manifest, samples), progress or _silent))
+
+    def _said(self, report: object) -> SinkReport:
+        if not isinstance(report, SinkReport):
+            raise SinkError(f"sink {self.name}: it gives no SinkReport but {report!r:.60}; {_cure(self.name)}")
+        return report
 
     def _limits_for(self, manifest: Manifest) -> GateLimits:
         return self._limits or GateLimits.of(manifest.device, len(manifest.channels))
@@ -158,7 +164,7 @@ class _GatedSamples:
         return self._samples.samples
 
     def blocks(self, block: int) -> Iterator[NDArray[np.float64]]:
-        gate = Gate(self._limits, self._manifest.channels, self._manifest.rate_hz)
+        gate = Gate(self._limits, self._manifest.channels, self._manifest.rate_hz, refused=CHANGED)
         for volts in self._samples.blocks(block):
             gate.check(volts)
             yield volts
