@@ -39,7 +39,7 @@ def test_the_readme_has_the_two_commands_five_of_dotwave_and_five_lines_of_pytho
     assert set(re.findall(r"^\./run (\w+)", shell, flags=re.MULTILINE)) == {"demo", "test"}
     assert len(re.findall(r"^dotwave ", shell, flags=re.MULTILINE)) == 5
     (python,) = re.findall(r"```python\n(.*?)```", read(README), flags=re.DOTALL)
-    assert len(python.strip().splitlines()) == 5
+    assert len(list(filter(None, python.splitlines()))) == 5
 
 
 def test_pages_and_readme_know_only_commands_that_exist() -> None:

@@ -12,6 +12,7 @@ __all__ = ["PACKAGES", "api", "markdown_of", "packages"]
 PACKAGES = ("encoders", "chainsim", "planner", "drivers")
 NOT_YET = "This version has no names of its own under `dotwave`; the packages below are its Python interface."
 ENTRY = re.compile(r"^(\S.*?) : (.*)$")
+TITLE, ESCAPE = "\x00", "\\"
 
 
 def api() -> str:
@@ -75,29 +76,44 @@ def _is_member(value: Any) -> bool:
 
 def markdown_of(docstring: str) -> str:
     """A numpydoc docstring as Markdown: section titles in bold, their entries as lists, examples as code."""
-    out: list[str] = []
-    lines = docstring.splitlines()
-    in_section = False
-    for index, line in enumerate(lines):
-        following = lines[index + 1] if index + 1 < len(lines) else ""
-        if line and re.fullmatch("-{3,}", following):
-            out += ["", f"**{line}**", ""]
-            in_section = True
-        elif not re.fullmatch("-{3,}", line):
-            out += _line(line, in_section)
-    return _fenced("\n".join(out)).strip()
+    return _sections("\n\n".join(map(_paragraph, _paragraphs(docstring)))).strip()
 
 
-def _line(line: str, in_section: bool) -> list[str]:
-    if not in_section or not line or line.startswith((">>>", "...", " ")):
-        return [line if line.lstrip().startswith((">>>", "...")) else _safe(line.strip() if in_section else line)]
+def _paragraphs(docstring: str) -> list[str]:
+    """Cut at blank lines; the title of a section stands alone."""
+    titles = re.sub(r"(?m)^(\S.*)\n-{3,}$", r"\n" + TITLE + r"\1\n", docstring)
+    return [one.strip("\n") for one in re.split(r"\n\s*\n", titles) if one.strip()]
+
+
+def _paragraph(text: str) -> str:
+    if text.startswith(TITLE):
+        return text
+    return f"```pycon\n{text}\n```" if text.lstrip().startswith(">>>") else _safe(text)
+
+
+def _sections(text: str) -> str:
+    """Below titles, entries that begin a line as lists; what is indented goes on."""
+    head, *parts = re.split(rf"(?m)^{TITLE}", text)
+    made = [head.strip()]
+    for part in parts:
+        title, _, body = part.partition("\n")
+        made.append(f"**{title.strip()}**\n\n{_entries(body.strip())}")
+    return "\n\n".join(made)
+
+
+def _entries(body: str) -> str:
+    if "```" in body:
+        return body
+    lines = body.splitlines()
+    return "\n".join(_item(line, after) for line, after in zip(lines, [*lines[1:], ""], strict=True))
+
+
+def _item(line: str, after: str) -> str:
+    """A name with its meaning behind a colon or indented below it is an item; other lines are as they are."""
     entry = ENTRY.match(line)
-    return [f"- `{entry[1]}`: {_safe(entry[2])}"] if entry else [f"- {_safe(line)}"]
-
-
-def _fenced(text: str) -> str:
-    """Examples with prompts, as far as the next blank line, in fences."""
-    return re.sub(r"(?m)^>>> (?:.+\n?)+", lambda match: f"\n```pycon\n{match[0].rstrip()}\n```\n", text)
+    if entry:
+        return f"- `{entry[1].replace(ESCAPE, '')}`: {entry[2]}"
+    return f"- {line}" if after.startswith(" ") and not line.startswith(" ") else line
 
 
 def _safe(words: str) -> str:

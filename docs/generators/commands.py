@@ -14,13 +14,14 @@ from dotwave.cli.help import GROUPS
 
 __all__ = ["command_names", "commands", "section", "summary"]
 
+APPLICATION = app
 EXAMPLE = "Example:"
 KINDS = {int: "whole number", float: "number", str: "text", Path: "file or folder"}
 
 
 def commands() -> dict[str, Any]:
-    """Every command by name, as click has it."""
-    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+    """Every command by name, as the parser has it."""
+    return dict(typer.main.get_command(APPLICATION).commands)  # type: ignore[attr-defined]
 
 
 def command_names() -> list[str]:
@@ -113,7 +114,7 @@ def _default(option: Any) -> str:
 
 def _hints(name: str) -> dict[str, Any]:
     """The annotations of a command's function; they say more than the parser keeps."""
-    parts = (app, *(group.typer_instance for group in app.registered_groups))
+    parts = (APPLICATION, *(group.typer_instance for group in APPLICATION.registered_groups))
     found = (one.callback for part in parts for one in part.registered_commands)
     callback = next(one for one in found if one.__name__.rstrip("_") == name)
     return get_type_hints(callback, include_extras=True)

@@ -1,0 +1,71 @@
+"""What the pages are made with: docstrings and notebook scripts as Markdown."""
+
+from __future__ import annotations
+
+from tests.support.docs_pages import generator
+
+API = generator("api")
+SCRIPT = generator("script")
+
+DOCSTRING = """First sentence, with a < b and lam * x.
+
+Parameters
+----------
+rows, cols : int, how many.
+    They are counted from 0.
+tol_v : float, relative.
+
+Returns
+-------
+A sentence that goes on
+over two lines.
+
+Raises
+------
+ValueError
+    When it is negative.
+
+Examples
+--------
+>>> 1 + 1
+2
+"""
+
+
+def test_a_docstring_becomes_lists_under_bold_titles() -> None:
+    made = API.markdown_of(DOCSTRING)
+    assert made.startswith("First sentence, with a &lt; b and lam \\* x.")
+    assert "**Parameters**" in made
+    assert "- `rows, cols`: int, how many.\n    They are counted from 0.\n- `tol_v`: float, relative." in made
+    assert "**Returns**\n\nA sentence that goes on\nover two lines." in made
+    assert "**Raises**\n\n- ValueError\n    When it is negative." in made
+    assert "```pycon\n>>> 1 + 1\n2\n```" in made
+    assert "---" not in made
+
+
+def test_code_in_a_docstring_stays_as_it_is() -> None:
+    assert API.markdown_of("Of ``a_b * c`` and `lam_m`, not x_y.") == "Of ``a_b * c`` and `lam_m`, not x\\_y."
+
+
+def test_every_public_name_has_a_row() -> None:
+    made = API.packages()
+    for package in API.PACKAGES:
+        module = __import__(package)
+        assert all(f"| `{name}` |" in made for name in module.__all__)
+
+
+def test_a_script_of_cells_becomes_words_and_code() -> None:
+    script = '''"""Head."""
+# %% [markdown]
+# # Title
+#
+# Words.
+
+# %%
+import dotwave as dw
+
+dw.device("x")
+
+# %%
+'''
+    assert SCRIPT.page_of(script) == ('# Title\n\nWords.\n\n```python\nimport dotwave as dw\n\ndw.device("x")\n```\n')
