@@ -109,6 +109,21 @@ def test_tools_are_installed_for_the_tests_only(house: House) -> None:
     assert len(house.called("pip")) == 2
 
 
+def test_the_pages_are_built_with_tools_of_their_own(house: House) -> None:
+    assert house.run("docs", "--dirty").returncode == 0
+    assert ".[docs]" in house.called("pip")[0]
+    assert house.called("tool mkdocs")[0].endswith("mkdocs build --quiet --strict --dirty")
+    assert house.run("docs").returncode == 0
+    assert len(house.called("pip")) == 1
+
+
+def test_pages_with_a_fault_are_a_failure(house: House) -> None:
+    house.stand_in(failing="mkdocs")
+    ended = house.run("docs")
+    assert ended.returncode == 1
+    assert "the pages are in" not in ended.stderr
+
+
 def test_arguments_folder_and_exit_code_pass_through(house: House, tmp_path: Path) -> None:
     house.stand_in(code=7)
     elsewhere = tmp_path / "else where"
