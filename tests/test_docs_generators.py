@@ -62,10 +62,12 @@ def test_a_script_of_cells_becomes_words_and_code() -> None:
 # Words.
 
 # %%
-import dotwave as dw
-
-dw.device("x")
+x = 3
+x  # noqa: B018 - shown
 
 # %%
+print(x)
 '''
-    assert SCRIPT.page_of(script) == ('# Title\n\nWords.\n\n```python\nimport dotwave as dw\n\ndw.device("x")\n```\n')
+    assert SCRIPT.page_of(script) == (
+        "## Title\n\nWords.\n\n```python\nx = 3\nx\n```\n\n```python\nprint(x)\n```\n\n```text\n3\n```\n"
+    )

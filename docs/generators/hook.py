@@ -13,12 +13,11 @@ from script import page_of
 ROOT = Path(__file__).resolve().parents[2]
 MARK = re.compile(r"^<!-- made: (\S+)(?: (\S+))? -->$", flags=re.MULTILINE)
 TUTORIAL = ROOT / "docs" / "tutorial.py"
+NO_NOTEBOOK = "The notebook is not in this tree."
 
 
-def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
+def on_page_markdown(markdown: str, **_: Any) -> str:
     """The page with everything in it that is made."""
-    if page.file.src_uri == "tutorial.md" and TUTORIAL.is_file():
-        return page_of(TUTORIAL.read_text(encoding="utf-8"))
     return MARK.sub(lambda mark: made(mark[1], mark[2] or ""), markdown)
 
 
@@ -36,6 +35,7 @@ def made(what: str, name: str) -> str:
         "api": lambda _: api(),
         "packages": lambda _: packages(),
         "protocol": lambda _: protocol(),
+        "notebook": lambda _: notebook(),
     }
     return makers[what](name)
 
@@ -43,3 +43,8 @@ def made(what: str, name: str) -> str:
 def protocol() -> str:
     """The protocol's page without its own title."""
     return (ROOT / "drivers" / "PROTOCOL.md").read_text(encoding="utf-8").partition("\n")[2]
+
+
+def notebook() -> str:
+    """The notebook's cells, and what they print."""
+    return page_of(TUTORIAL.read_text(encoding="utf-8")) if TUTORIAL.is_file() else NO_NOTEBOOK
