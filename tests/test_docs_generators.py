@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from chainsim import Start
 from tests.support.docs_pages import generator
 
 API = generator("api")
@@ -41,6 +42,22 @@ def test_a_docstring_becomes_lists_under_bold_titles() -> None:
     assert "**Raises**\n\n- ValueError\n    When it is negative." in made
     assert "```pycon\n>>> 1 + 1\n2\n```" in made
     assert "---" not in made
+
+
+def test_signatures_are_plain_and_long_ones_stand_in_lines() -> None:
+    def short(place: int, kind: Start = Start.REST) -> str: ...
+
+    def long(first_of_all: dict[str, int], second_of_all: int | None = None, *, third_of_all_names: float) -> None: ...
+
+    assert API._signature("short", short) == "short(place: int, kind: Start = Start.REST) -> str"
+    assert API._signature("long", long).splitlines() == [
+        "long(",
+        "    first_of_all: dict[str, int],",
+        "    second_of_all: int | None = None,",
+        "    *,",
+        "    third_of_all_names: float,",
+        ")",
+    ]
 
 
 def test_code_in_a_docstring_stays_as_it_is() -> None:

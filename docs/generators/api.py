@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+from enum import Enum
 from typing import Any
 
 __all__ = ["PACKAGES", "api", "markdown_of", "packages"]
@@ -12,14 +13,21 @@ __all__ = ["PACKAGES", "api", "markdown_of", "packages"]
 PACKAGES = ("encoders", "chainsim", "planner", "drivers")
 NOT_YET = "This version has no names of its own under `dotwave`; the packages below are its Python interface."
 ENTRY = re.compile(r"^(\S.*?) : (.*)$")
+WIDE = 80
 TITLE, ESCAPE = "\x00", "\\"
 
 
 def api() -> str:
-    """Every name of `dotwave.__all__` with its signature and docstring."""
+    """Every name of `dotwave.__all__` with its signature and docstring: functions, then classes, then errors."""
     module = importlib.import_module("dotwave")
-    names = list(getattr(module, "__all__", ()))
+    names = sorted(getattr(module, "__all__", ()), key=lambda name: (_rank(getattr(module, name)), name))
     return "\n\n".join(_entry(name, getattr(module, name)) for name in names) if names else NOT_YET
+
+
+def _rank(thing: Any) -> int:
+    if inspect.isclass(thing):
+        return 2 if issubclass(thing, BaseException) else 1
+    return 0
 
 
 def packages() -> str:
@@ -44,9 +52,9 @@ def _first_sentence(thing: Any) -> str:
 def _entry(name: str, thing: Any) -> str:
     parts = [f"### dotwave.{name}"]
     if inspect.isclass(thing) or inspect.isroutine(thing):
-        signature = _signature(thing)
+        signature = _signature(name, thing)
         if signature:
-            parts.append(f"```python\n{name}{signature}\n```")
+            parts.append(f"```python\n{signature}\n```")
         parts.append(markdown_of(inspect.getdoc(thing) or ""))
     else:
         parts.append(_first_sentence(thing))
@@ -57,11 +65,17 @@ def _entry(name: str, thing: Any) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def _signature(thing: Any) -> str:
-    try:
-        return str(inspect.signature(thing))
-    except (TypeError, ValueError):
+def _signature(name: str, thing: Any) -> str:
+    """How it is called, annotations without quotes; a model that is read from files has its fields in the docstring."""
+    if hasattr(thing, "model_fields") or (inspect.isclass(thing) and issubclass(thing, BaseException | Enum)):
         return ""
+    words = re.sub(r"(: |-> )'([^']*)'", r"\1\2", str(inspect.signature(thing)))
+    words = re.sub(r"<(\w+\.\w+): [^>]*>", r"\1", words)
+    words = words.removesuffix(" -> None")
+    if len(name + words) <= WIDE:
+        return name + words
+    parameters, _, back = words.removeprefix("(").rpartition(")")
+    return f"{name}(\n    " + ",\n    ".join(re.split(r", (?=[*\w]+(?::|=|,|$)|\*,)", parameters)) + f",\n){back}"
 
 
 def _members(thing: type) -> list[tuple[str, Any]]:
