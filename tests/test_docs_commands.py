@@ -17,7 +17,7 @@ from tests.support.docs_pages import DOCS, EVERY, README, ROOT, blocks, generato
 MADE = generator("commands")
 COMMANDS = MADE.commands()
 # A terminal of their own, hardware, minutes, or files of somebody else's.
-NOT_HERE = re.compile(r"emulate|--live|--port|bootstrap|arrived|bench|tradeoff|pareto|calibrate|dotwave ports")
+NOT_HERE = re.compile(r"emulate|--live|--port|bootstrap|arrived|bench|tradeoff|pareto|dotwave ports")
 
 each_command = pytest.mark.parametrize("name", sorted(COMMANDS))
 
@@ -99,22 +99,28 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
         named = re.findall(r"[Pp]ut this into `(\w+\.yaml)`|`(\w+\.yaml)`:\n", before[-300:])
         if named:
             (folder / next(filter(None, named[-1]))).write_text(block.text, encoding="utf-8")
+    assert run('dotwave text "Hello world" --device linked-6x6 -o hello.wav', folder).returncode == 0
     return folder
 
 
+def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """One line in a process of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    call = [sys.executable, "-m", "dotwave", *words_of(line)]
+    return subprocess.run(call, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
 def runnable() -> list[Path]:
-    return [README, DOCS / "tutorial.md", DOCS / "apps.md", DOCS / "devices.md"]
+    return [README, *(DOCS / f"{name}.md" for name in ("tutorial", "apps", "devices", "playing"))]
 
 
 @pytest.mark.parametrize("page", runnable(), ids=lambda page: page.name)
 def test_the_cheap_ones_run_one_after_another(page: Path, workshop: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     ran = 0
     for line in dict.fromkeys(shown([page])):
         if NOT_HERE.search(line):
             continue
-        call = [sys.executable, "-m", "dotwave", *words_of(line)]
-        ended = subprocess.run(call, cwd=workshop, env=environment, capture_output=True, text=True, check=False)
+        ended = run(line, workshop)
         # doctor says 1 where something is missing on this machine.
         assert ended.returncode in ((0, 1) if "doctor" in line else (0,)), f"{line}\n{ended.stderr}"
         ran += 1

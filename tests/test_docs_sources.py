@@ -103,6 +103,18 @@ def _docstrings(path: Path) -> str:
     return "\n".join(ast.get_docstring(one) or "" for one in ast.walk(ast.parse(read(path))) if isinstance(one, nodes))
 
 
+def test_names_of_the_glossary_are_names_of_the_program_in_order() -> None:
+    rows = re.findall(r"^\| ([^|]+) \| ([^|]*?) ?\| [^|]+ \|$", read(DOCS / "glossary.md"), flags=re.MULTILINE)[1:]
+    words = [word.lower() for word, _ in rows]
+    assert words == sorted(words)
+    assert len(words) == len(set(words))
+    source = "\n".join(map(read, CODE)) + "\n".join(str(path.relative_to(ROOT)) for path in CODE)
+    known = set(re.findall(r"\w+", source))
+    for word, code in rows:
+        for name in re.findall(r"`([\w.]+)`", code):
+            assert set(name.split(".")) <= known, f"{word}: {name}"
+
+
 @each_page
 def test_fences_are_closed_and_say_their_language(page: Path) -> None:
     text = read(page)
