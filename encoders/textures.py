@@ -64,8 +64,8 @@ def walking_bars(
 ) -> TargetPattern:
     """Vertical bars that walk: two tones whose lags differ by pi/width beat with bars `width` actuators wide.
 
-    On coupled chains width and rate hang together (physics: the rate is f0 delta tan(pi / 2 width) for equal unit
-    gains): give one of them. Single actuators take both.
+    On coupled chains width and rate hang together (theory.md section 2.5: the rate is f0 delta tan(pi / 2 width) for
+    equal unit gains): give one of them. Single actuators take both.
 
     Parameters
     ----------

@@ -34,6 +34,9 @@ class House:
         self.root.mkdir()
         shutil.copy(ROOT / "run", self.root / "run")
         (self.root / "pyproject.toml").write_text("[project]\n")
+        (self.root / "requirements").mkdir()
+        for name in ("app.txt", "dev.txt"):
+            (self.root / "requirements" / name).write_text("numpy==2.4.6\n")
         self.log = folder / "log"
         self.log.touch()
         self.python = folder / "python"
@@ -51,6 +54,10 @@ class House:
     def called(self, what: str) -> list[str]:
         return [line for line in self.log.read_text().splitlines() if line.startswith(what)]
 
+    def installed(self) -> list[str]:
+        """What was installed, after the versions it needs."""
+        return [line.split()[-1] for line in self.called("pip") if "--editable" in line]
+
 
 @pytest.fixture
 def house(tmp_path: Path) -> House:
@@ -59,32 +66,32 @@ def house(tmp_path: Path) -> House:
 
 def test_installs_once(house: House) -> None:
     assert house.run("dotwave", "doctor").returncode == 0
-    assert len(house.called("pip")) == 1
+    assert len(house.installed()) == 1
     second = house.run("dotwave", "doctor")
     assert second.returncode == 0
     assert second.stderr == ""
-    assert len(house.called("pip")) == 1
+    assert len(house.installed()) == 1
 
 
 def test_installs_again_when_the_requirements_change(house: House) -> None:
     house.run("dotwave", "doctor")
     (house.root / "pyproject.toml").write_text("[project]\nname = 'other'\n")
     house.run("dotwave", "doctor")
-    assert len(house.called("pip")) == 2
+    assert len(house.installed()) == 2
 
 
 def test_installs_again_after_the_folder_moved(house: House) -> None:
     house.run("dotwave", "doctor")
     house.root = house.root.rename(house.root.parent / "moved")
     house.run("dotwave", "doctor")
-    assert len(house.called("pip")) == 2
+    assert len(house.installed()) == 2
 
 
 def test_rebuilds_an_environment_without_its_python(house: House) -> None:
     house.run("dotwave", "doctor")
     (house.root / ".venv" / "bin" / "python").unlink()
     assert house.run("dotwave", "doctor").returncode == 0
-    assert len(house.called("pip")) == 2
+    assert len(house.installed()) == 2
 
 
 def test_an_installation_that_failed_is_tried_again(house: House) -> None:
@@ -96,27 +103,35 @@ def test_an_installation_that_failed_is_tried_again(house: House) -> None:
     assert "the Python package registry (PyPI)" in failed.stderr
     broken.unlink()
     assert house.run("dotwave", "doctor").returncode == 0
-    assert len(house.called("pip")) == 2
+    assert house.installed() == ["."]
 
 
 def test_tools_are_installed_for_the_tests_only(house: House) -> None:
     house.run("dotwave", "doctor")
-    assert ".[dev]" not in house.called("pip")[0]
+    assert [line for line in house.called("pip") if "--require-hashes" in line and "requirements/app.txt" in line]
+    assert not [line for line in house.called("pip") if "requirements/dev.txt" in line]
     house.run("test")
-    assert ".[dev]" in house.called("pip")[1]
+    assert [line for line in house.called("pip") if "--require-hashes" in line and "requirements/dev.txt" in line]
     house.run("dotwave", "doctor")
     house.run("test")
-    assert len(house.called("pip")) == 2
+    assert len(house.installed()) == 2
+
+
+def test_installs_again_when_a_tested_version_changes(house: House) -> None:
+    house.run("dotwave", "doctor")
+    (house.root / "requirements" / "app.txt").write_text("numpy==2.4.7\n")
+    house.run("dotwave", "doctor")
+    assert len(house.installed()) == 2
 
 
 def test_the_notebook_is_made_of_the_tutorial_and_opened(house: House) -> None:
     assert house.run("notebook").returncode == 0
-    assert ".[notebook]" in house.called("pip")[0]
+    assert house.installed() == [".[notebook]"]
     made, opened = house.called("tool")
     assert made == "tool jupytext -m jupytext --quiet --to notebook --output out/tutorial.ipynb docs/tutorial.py"
     assert opened == "tool jupyterlab -m jupyterlab out/tutorial.ipynb"
     house.run("dotwave", "doctor")
-    assert len(house.called("pip")) == 1
+    assert len(house.installed()) == 1
 
 
 def test_a_notebook_that_cannot_be_made_is_said(house: House) -> None:
@@ -125,6 +140,21 @@ def test_a_notebook_that_cannot_be_made_is_said(house: House) -> None:
     assert ended.returncode == 1
     assert "jupytext could not make the notebook" in ended.stderr
     assert [line.split()[1] for line in house.called("tool")] == ["jupytext"]
+
+
+def test_the_pages_are_built_with_tools_of_their_own(house: House) -> None:
+    assert house.run("docs", "--dirty").returncode == 0
+    assert house.installed() == [".[docs]"]
+    assert house.called("tool mkdocs")[0].endswith("mkdocs build --quiet --strict --dirty")
+    assert house.run("docs").returncode == 0
+    assert len(house.installed()) == 1
+
+
+def test_pages_with_a_fault_are_a_failure(house: House) -> None:
+    house.stand_in(failing="mkdocs")
+    ended = house.run("docs")
+    assert ended.returncode == 1
+    assert "the pages are in" not in ended.stderr
 
 
 def test_arguments_folder_and_exit_code_pass_through(house: House, tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ The linearised ring of n equal oscillators has waves z_m ~ e^{mu tau - i m phi},
     mu^2 + delta mu + 1 + lam = lam e^{i phi}.
 
 One grows when lam^2 sin^2 phi > delta^2 (1 + lam (1 - cos phi)). As n grows the phases fill the circle and the
-eigenvalues a curve, the asymptotic continuous spectrum (Yanchuk and Wolfrum, SIAM J. Appl. Dyn. Syst. 9, 2010).
+eigenvalues a curve, the asymptotic continuous spectrum (Yanchuk and Wolfrum, SIAM J. Appl. Dyn. Syst. 9, 2010). See
+theory.md section 3.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Chain:
-    """A chain or grid of n forced, coupled Duffing oscillators (the paper's Eq. 2).
+    """A chain or grid of n forced, coupled Duffing oscillators (the paper's Eq. 2, theory.md section 1.1).
 
     ``z_1'' + delta z_1' + z_1 + beta z_1^3 = epsilon cos(omega tau + psi) + epsilon_0``
     ``z_m'' + delta z_m' + z_m + beta z_m^3 = lam_m (z_{m-1} - z_m) + b_m``

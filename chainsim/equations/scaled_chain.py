@@ -27,7 +27,7 @@ FAINT = 1e-140
 class ScaledChain:
     """N settings of a chain: ``z_m'' + delta_m z_m' + k_m z_m + sign_m z_m^3 = f_m(tau) + inputs``.
 
-    z, epsilon and the constant forces are multiplied by `length` = sqrt|beta| (physics: z -> z sqrt|beta|
+    z, epsilon and the constant forces are multiplied by `length` = sqrt|beta| (theory.md section 1.2: this
     removes |beta|), so a beta of -1e12 is no harder than -1. The inputs of oscillator m are
     ``lam_m z_{m-1} + other_m z_{m+stride}``; the back terms of the links are in k.
 

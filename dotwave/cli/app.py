@@ -132,7 +132,7 @@ def simulate(
 ) -> None:
     """Solve a chain of coupled oscillators and print what it does, as JSON.
 
-    The file says `chain`, `setting`, `rung`, `tol` and `start`; README.md has one to copy. The exit code
+    The file says `chain`, `setting`, `rung`, `tol` and `start`; samples/chains has some to copy. The exit code
     is 1 when the outcome is not ok; the JSON is printed all the same.
 
     \b

@@ -1,4 +1,4 @@
-"""Patterns held still by a DC bias on every actuator (the paper's goal 1)."""
+"""Patterns held still by a DC bias on every actuator (the paper's goal 1, theory.md section 2.4)."""
 
 from __future__ import annotations
 

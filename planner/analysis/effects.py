@@ -1,7 +1,7 @@
 """What leaving a term out of the model does to a standing chain, to first order in the term.
 
 Every term is a small force on each actuator of a motion that is known. The linearised equations about that motion
-(one harmonic, physics.md section 2) say how far it moves; links carry what happens at one actuator to those behind it.
+(one harmonic, theory.md section 2.1) say how far it moves; links carry what happens at one actuator to those behind it.
 """
 
 from __future__ import annotations

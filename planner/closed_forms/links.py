@@ -30,7 +30,7 @@ def stages(chain: Chain, part: slice | int = slice(None)) -> Stage:
 
 
 def stage_constant(chain: Chain, amplitude: Floats, omega: float, part: slice | int = slice(None)) -> Floats:
-    """kappa_m = 1 - omega^2 + (3/4) beta a_m^2 of physics.md section 2 (one harmonic), the 1 its own stiffness.
+    """kappa_m = 1 - omega^2 + (3/4) beta a_m^2 of theory.md section 2.1 (one harmonic), the 1 its own stiffness.
 
     `part` : which oscillators the last axis of `amplitude` stands for.
     """

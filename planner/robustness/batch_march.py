@@ -79,8 +79,8 @@ def march(
     """The motion of every chain of a batch.
 
     ``(k_m + lam_m - omega^2 + (3/4) beta_m |A_m|^2 + i delta_m omega) A_m = f_m + lam_m A_{m-1}``, or for omega = 0
-    ``(k_m + lam_m + beta_m A_m^2) A_m = f_m + lam_m A_{m-1}``: physics.md section 2. What is left out changes a first
-    harmonic by about (beta a^2)^2/40 over its distance to resonance; a static deflection is exact.
+    ``(k_m + lam_m + beta_m A_m^2) A_m = f_m + lam_m A_{m-1}``: theory.md section 2.1. What is left out changes a
+    first harmonic by about (beta a^2)^2/40 over its distance to resonance; a static deflection is exact.
 
     Of several answers it takes the smallest, which a slow rise from rest reaches.
 

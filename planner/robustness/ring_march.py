@@ -24,7 +24,7 @@ def march_ring(
     """The motion of every ring of a batch on the branch of the one they are drawn around.
 
     ``(k_m + lam_m - omega^2 + (3/4) beta_m |A_m|^2 + i delta_m omega) A_m = f_m + lam_m A_{m-1}``, the first after the
-    last: physics.md section 2. Where the branch ends on the way to a ring, so does its motion: it counts as escaped,
+    last: theory.md section 2.1. Where the branch ends on the way to a ring, so does its motion: it counts as escaped,
     with nothing felt. Whether a motion is stable is not asked.
 
     Parameters

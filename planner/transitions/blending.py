@@ -1,7 +1,7 @@
 """Changes between amplitude profiles whose moduli follow a blend: links and drive in Taylor jets, ways alike once.
 
 From the last actuator up, ``A_{m-1} = A_m + mu G_m`` with ``|G|^2 mu^2 + 2 Re(A conj(G)) mu + |A|^2 - r_{m-1}^2 = 0``,
-mu = 1/lam_m(tau) (physics.md section 4). What happens at an actuator depends on those behind it alone, so that ways
+mu = 1/lam_m(tau) (theory.md section 4.3). What happens at an actuator depends on those behind it alone, so that ways
 with the same ends there share the work.
 """
 

@@ -2,7 +2,7 @@
 
 With z_m = Re(A_m e^{i omega tau}), one stage of the chain reads
 ``lam_m A_{m-1} = G_m + lam_m A_m``, ``G_m = kappa_m A_m + (2 i omega + delta) A_m' + A_m''``
-with ``kappa_m = 1 - omega^2 + i delta omega + (3/4) beta |A_m|^2`` (physics.md section 4). All functions work
+with ``kappa_m = 1 - omega^2 + i delta omega + (3/4) beta |A_m|^2`` (theory.md section 4.2). All functions work
 on Taylor jets over P ramps at once: shape (K, P, nodes).
 """
 

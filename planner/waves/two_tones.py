@@ -7,7 +7,7 @@ cubic spring makes of them. Each stage asks, in the slow flow,
     (1 - omega_k^2 + i delta omega_k + lam - lam e^{i (phi + k step)}) c_k + (3/4) beta [|A|^2 A]_k = 0,
 
 and the drive is what is left of the same without lam. So a drive of the two tones and a little of their
-combinations gives every actuator the same amplitudes exactly (physics.md section 2, "Bars").
+combinations gives every actuator the same amplitudes exactly (theory.md section 2.5).
 """
 
 from __future__ import annotations

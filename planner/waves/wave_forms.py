@@ -20,8 +20,8 @@ Complexes = NDArray[np.complex128]
 def wave_for(chain: Chain, *, amplitude: float, lag: float, ratio: float = 1.0) -> OperatingPoint:
     """The point with ``A_m = amplitude ratio^m e^{-i m lag}``, in one harmonic.
 
-    ``lam = r delta omega / sin lag`` and ``omega^2 = 1 + (3/4) beta a^2 + lam (1 - cos(lag) / r)`` (physics.md
-    section 2), with a^2 the mean over the actuators behind the first; exact where r = 1 or beta = 0.
+    ``lam = r delta omega / sin lag`` and ``omega^2 = 1 + (3/4) beta a^2 + lam (1 - cos(lag) / r)`` (docs/theory.md
+    section 2.2), with a^2 the mean over the actuators behind the first; exact where r = 1 or beta = 0.
 
     Parameters
     ----------
