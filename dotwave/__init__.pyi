@@ -19,6 +19,10 @@ from .api.scenes import (
     text as text,
     texture as texture,
 )
+from .api.sinks import (
+    Player as Player,
+    open as open,
+)
 from .api.types import (
     Chain as Chain,
     ChainError as ChainError,
