@@ -153,16 +153,20 @@ class Table(html.parser.HTMLParser):
 def test_objects_show_themselves_in_one_line_and_as_tables() -> None:
     plan = dw.plan(dw.text("<b>Hi</b> & you, it rains", "paper-6x6"), "paper-6x6")
     felt = dw.verify(plan)
-    for shown, rows in ((plan, len(plan)), (plan.waveform(), 42), (felt, len(plan))):
+    report, terms = plan.report(), plan.explain()
+    facts = len(report.as_dict())
+    shown_as = ((plan, len(plan)), (plan.waveform(), 42), (felt, len(plan)), (report, facts), (terms, 10))
+    for shown, rows in shown_as:
         assert "\n" not in repr(shown)
         assert len(repr(shown)) < 200
         words = shown._repr_html_()
         table = Table(words)
         assert table.tags.count("caption") == 1
         assert table.scopes["row"] == rows
-        assert table.scopes["col"] >= 4
+        assert table.scopes["col"] >= 2
         assert "<b>" not in words
     assert len(repr(plan[0])) < 100
+    assert repr(felt.frames[0]) == "FrameCheck(from 0.00 s, 0 wrong dots, error 0.00 %)"
     assert len(repr(plan.scene)) < 100
 
 

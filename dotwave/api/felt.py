@@ -7,9 +7,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..reports.html import html_table
 from ..reports.text import VerifyReport, decibels
 from ..verification import verify as verify_file
-from .html import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

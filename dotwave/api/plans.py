@@ -16,11 +16,11 @@ from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, PlanError, plan_scene
 
 from ..errors import AppError, NotMade
 from ..rendering.render import render
+from ..reports.html import html_table
 from ..reports.report import Report
 from ..request import Request
 from ..scenes import DeviceScene
 from ..studies.judge import Judge
-from .html import html_table
 from .scenes import AnyDevice, device as device_of
 
 if TYPE_CHECKING:
