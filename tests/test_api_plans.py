@@ -55,6 +55,13 @@ def test_the_ten_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert felt.text == "Hello world"
     assert felt.frames[1].amplitude.shape == (6, 6)
     assert len(felt.figure().axes) == 4
+    chain = dw.Chain(n=6, delta=5.3006e-3, beta=-1.0)
+    setting = dw.Setting.of(chain, epsilon=1e-4, lam=6.131e-3, omega=1.0)
+    one = dw.solve(chain, setting, tol=1e-6)
+    many = dw.sweep(chain, epsilon=1e-4, lam=6.131e-3, omega=[0.99, 1.0])
+    np.testing.assert_allclose(np.asarray(many["phasor"])[0, 0, 1], one.phasor[0], rtol=1e-5)
+    with dw.open("controller:/dev/nowhere") as sink, pytest.raises(dw.DriverError, match="/dev/nowhere"):
+        sink.play(wave)
 
 
 def test_samples_are_those_of_the_file(tmp_path: Path) -> None:
