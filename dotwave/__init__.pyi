@@ -6,6 +6,10 @@ from .api.felt import (
     Felt as Felt,
     verify as verify,
 )
+from .api.pictures import (
+    icons as icons,
+    image as image,
+)
 from .api.plans import (
     PlanWaveform as PlanWaveform,
     ScenePlan as ScenePlan,
@@ -13,11 +17,13 @@ from .api.plans import (
 )
 from .api.scenes import (
     device as device,
-    icons as icons,
-    image as image,
     job as job,
     text as text,
     texture as texture,
+)
+from .api.sinks import (
+    Player as Player,
+    open as open,
 )
 from .api.types import (
     Chain as Chain,

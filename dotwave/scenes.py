@@ -1,48 +1,42 @@
-"""Texts, pictures and patterns as scenes, each with a line that says what it is; and scenes one after another."""
+"""Texts and patterns as scenes, each with a line that says what it is; and scenes one after another."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from chainsim import Device
-from encoders import (
-    Frame,
-    GridShape,
-    PictureOptions,
-    PictureReport,
-    PictureScene,
-    Scene,
-    TargetPattern,
-    TextOptions,
-    TextScene,
-    TextSource,
-    encode_picture,
-    encode_text,
-)
+from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextScene, TextSource, encode_text
+from planner import PlanError
 
-__all__ = ["SceneFrames", "joined", "picture_scene", "pitched", "still_scene", "text_scene"]
+from .request import Request
+
+__all__ = ["DeviceScene", "SceneFrames", "joined", "still_scene", "text_scene"]
 
 LONGEST_WORDS = 40
 
 
-def pitched(options: PictureOptions, device: Device) -> PictureOptions:
-    """The options for pictures on the grid of a device."""
-    return replace(options, pitch_m=(device.pitch_m, device.pitch_m))
+@dataclass(frozen=True, repr=False)
+class DeviceScene(Scene):
+    """A scene that brings the device to show it on, and says how it is to be planned."""
+
+    device: Device = field(kw_only=True)
+
+    @abstractmethod
+    def request(self, given: Request) -> Request:
+        """What is asked of its run: what is given, and what the scene says where nothing is."""
+
+    @abstractmethod
+    def placed(self, error: PlanError) -> Exception:
+        """What the planner refused, with the place in the scene that it was about."""
 
 
 def text_scene(source: TextSource, shape: GridShape, options: TextOptions) -> TextScene:
     """A text; raises as `encoders.encode_text` does."""
     words = source.text if len(source.text) <= LONGEST_WORDS else source.text[: LONGEST_WORDS - 3] + "..."
     return replace(encode_text(source, shape, options), parts=(f"text: {words}",))
-
-
-def picture_scene(source: Path | bytes, shape: GridShape, options: PictureOptions) -> PictureScene:
-    """A picture; raises as `encoders.encode_picture` does."""
-    scene = encode_picture(source, shape, options)
-    return replace(scene, parts=(_picture_words(scene.report),))
 
 
 def still_scene(pattern: TargetPattern, dwell_s: float, words: str) -> Scene:
@@ -75,10 +69,3 @@ class SceneFrames:
                 page = max(page, frame.page)
                 yield replace(frame, page=first + frame.page)
             first += page + 1
-
-
-def _picture_words(report: PictureReport) -> str:
-    """File, style, similarity, and what was left out."""
-    frames = f", {len(report.frames)} frames" if len(report.frames) > 1 else ""
-    notes = f" ({'; '.join(report.notes)})" if report.notes else ""
-    return f"{report.style}: {Path(report.name).name}{frames}, similarity {report.similarity:.2f}{notes}"

@@ -10,7 +10,6 @@ import numpy as np
 
 from planner import Plan
 
-from .exchange.file import write_exchange
 from .formats.table import format_of
 from .formats.wav import Encoding
 from .waveform.file import write_waveform
@@ -58,6 +57,9 @@ def write_plan(
     """
     path = Path(path)
     if not format_of(path).sample_bytes:
+        # Imported here: most files are samples.
+        from .exchange.file import write_exchange
+
         write_exchange(plan, path, actuator=actuator)
         return WrittenPlan((path,), None)
     written = write_waveform(plan, path, encoding=encoding, progress=progress)

@@ -55,6 +55,13 @@ def test_the_ten_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert felt.text == "Hello world"
     assert felt.frames[1].amplitude.shape == (6, 6)
     assert len(felt.figure().axes) == 4
+    chain = dw.Chain(n=6, delta=5.3006e-3, beta=-1.0)
+    setting = dw.Setting.of(chain, epsilon=1e-4, lam=6.131e-3, omega=1.0)
+    one = dw.solve(chain, setting, tol=1e-6)
+    many = dw.sweep(chain, epsilon=1e-4, lam=6.131e-3, omega=[0.99, 1.0])
+    np.testing.assert_allclose(np.asarray(many["phasor"])[0, 0, 1], one.phasor[0], rtol=1e-5)
+    with dw.open("controller:/dev/nowhere") as sink, pytest.raises(dw.DriverError, match="/dev/nowhere"):
+        sink.play(wave)
 
 
 def test_samples_are_those_of_the_file(tmp_path: Path) -> None:
@@ -153,16 +160,20 @@ class Table(html.parser.HTMLParser):
 def test_objects_show_themselves_in_one_line_and_as_tables() -> None:
     plan = dw.plan(dw.text("<b>Hi</b> & you, it rains", "paper-6x6"), "paper-6x6")
     felt = dw.verify(plan)
-    for shown, rows in ((plan, len(plan)), (plan.waveform(), 42), (felt, len(plan))):
+    report, terms = plan.report(), plan.explain()
+    facts = len(report.as_dict())
+    shown_as = ((plan, len(plan)), (plan.waveform(), 42), (felt, len(plan)), (report, facts), (terms, 10))
+    for shown, rows in shown_as:
         assert "\n" not in repr(shown)
         assert len(repr(shown)) < 200
         words = shown._repr_html_()
         table = Table(words)
         assert table.tags.count("caption") == 1
         assert table.scopes["row"] == rows
-        assert table.scopes["col"] >= 4
+        assert table.scopes["col"] >= 2
         assert "<b>" not in words
     assert len(repr(plan[0])) < 100
+    assert repr(felt.frames[0]) == "FrameCheck(from 0.00 s, 0 wrong dots, error 0.00 %)"
     assert len(repr(plan.scene)) < 100
 
 

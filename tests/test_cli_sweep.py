@@ -105,7 +105,7 @@ def test_goes_on_where_it_was_stopped(source, tmp_path, monkeypatch):
     run_sweep(source, tmp_path / "whole.npz", units=1)
     import dotwave.studies.sweep as module
 
-    solve, calls = module._answers, []
+    solve, calls = module.answers, []
 
     def fails_late(sweep, first, *rest):
         calls.append(first)
@@ -113,7 +113,7 @@ def test_goes_on_where_it_was_stopped(source, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return solve(sweep, first, *rest)
 
-    monkeypatch.setattr(module, "_answers", fails_late)
+    monkeypatch.setattr(module, "answers", fails_late)
     out = tmp_path / "out.npz"
     with pytest.raises(KeyboardInterrupt):
         run_sweep(source, out, units=1)
@@ -129,7 +129,7 @@ def test_parts_of_another_sweep_are_refused(source, tmp_path, monkeypatch):
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dotwave.studies.sweep._answers", stop)
+    monkeypatch.setattr("dotwave.studies.sweep.answers", stop)
     with pytest.raises(KeyboardInterrupt):
         run_sweep(source, tmp_path / "out.npz")
     source.write_text(TEXT.replace("1.0e-8", "1.0e-6"))

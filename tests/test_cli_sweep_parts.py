@@ -54,7 +54,7 @@ def stopped(source: Path, out: Path, monkeypatch: pytest.MonkeyPatch, chunks: in
     """The parts of a run that was stopped after so many chunks; with all seven, when it was to write the file."""
     import dotwave.studies.sweep as module
 
-    solve, calls = module._answers, []
+    solve, calls = module.answers, []
 
     def fails(*given: object) -> object:
         calls.append(given)
@@ -66,7 +66,7 @@ def stopped(source: Path, out: Path, monkeypatch: pytest.MonkeyPatch, chunks: in
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "_answers", fails)
+        patch.setattr(module, "answers", fails)
         patch.setattr(module, "_counted", refuse)
         with pytest.raises(KeyboardInterrupt):
             run(source, out)
@@ -275,7 +275,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_spoils_nothing(
 ) -> None:
     import dotwave.studies.sweep as module
 
-    out, solve, refused = tmp_path / "out.npz", module._answers, []
+    out, solve, refused = tmp_path / "out.npz", module.answers, []
 
     def meanwhile(*given: object) -> object:
         if not refused:
@@ -284,7 +284,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_spoils_nothing(
                 run(source, out)
         return solve(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(module, "_answers", meanwhile)
+    monkeypatch.setattr(module, "answers", meanwhile)
     assert run(source, out) == 0
     assert refused
     assert out.read_bytes() == whole

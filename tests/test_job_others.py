@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dotwave.rendering.render import render_job
+from dotwave.rendering.job import render_job
 
 ROOT = Path(__file__).resolve().parent.parent
 SECRET = "hunter2:x:0:0\n"

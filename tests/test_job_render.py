@@ -10,10 +10,12 @@ import pytest
 from PIL import Image
 
 from chainsim import load_device
-from dotwave.api.scenes import device as device_of, image as image_scene
+from dotwave.api.pictures import image as image_scene
+from dotwave.api.scenes import device as device_of
 from dotwave.cli.options import picture_options
 from dotwave.errors import AppError
-from dotwave.rendering.render import render, render_job
+from dotwave.rendering.job import render_job
+from dotwave.rendering.render import render
 from dotwave.rendering.steps import write_steps
 from dotwave.verification import verify
 from encoders import EncodeError, GridShape, PictureOptions, encode_picture

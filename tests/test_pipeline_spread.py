@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from chainsim import ProfileError, load_device
-from dotwave.rendering.render import render_job
+from dotwave.rendering.job import render_job
 from dotwave.reports.scene import SceneReport
 from dotwave.verification import verify
 from planner.closed_forms.links import drive_for, links_for

@@ -74,7 +74,7 @@ class Stats:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response:
     """Periodic steady states of N settings of a chain of n.
 
@@ -106,6 +106,10 @@ class Response:
     branch: NDArray[np.int8]
     error_estimate: NDArray[np.float64]
     stats: Stats = field(default_factory=Stats)
+
+    def __repr__(self) -> str:
+        ok = int(sum(outcome is Outcome.OK for outcome in self.outcome))
+        return f"Response({len(self)} settings of {self.mean.shape[1]} oscillators by {self.rung}, {ok} ok)"
 
     @property
     def phasor(self) -> NDArray[np.complex128]:

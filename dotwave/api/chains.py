@@ -65,7 +65,7 @@ def sweep(
     epsilon: ArrayLike,
     lam: ArrayLike = 0.0,
     omega: ArrayLike = 1.0,
-    tol: float,
+    tol: float = 1e-6,
     from_rest: bool = True,
     **fixed: Any,
 ) -> Any:
@@ -105,7 +105,7 @@ def sweep(
     >>> import dotwave as dw, numpy as np
     >>> chain = dw.Chain(n=6, delta=5.3006e-3, beta=-1.0)
     >>> omega = np.linspace(0.99, 1.01, 5)
-    >>> found = dw.sweep(chain, epsilon=1e-4, lam=6.131e-3, omega=omega, tol=1e-6)
+    >>> found = dw.sweep(chain, epsilon=1e-4, lam=6.131e-3, omega=omega)
     >>> found["phasor"].shape, bool(found["stable"].all())
     ((1, 1, 5, 6), True)
     """

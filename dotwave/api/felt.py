@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..reports.html import html_table
 from ..reports.text import VerifyReport, decibels
 from ..verification import verify as verify_file
-from .html import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,13 +53,10 @@ def verify(what: str | PathLike[str] | ScenePlan | PlanWaveform) -> Felt:
     """
     if isinstance(what, str | PathLike):
         return Felt.of(verify_file(Path(what)))
-    from .plans import ScenePlan
+    from .memory import MEMORY, on_disk
 
-    wave = what.waveform() if isinstance(what, ScenePlan) else what
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "memory.npz"
-        wave.write(path)
-        return Felt.of(verify_file(path), "a waveform in memory")
+    with on_disk(what) as path:
+        return Felt.of(verify_file(path), MEMORY)
 
 
 @dataclass(frozen=True, repr=False)

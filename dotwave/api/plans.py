@@ -15,12 +15,12 @@ from encoders import Scene
 from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, PlanError, plan_scene
 
 from ..errors import AppError, NotMade
-from ..jobs.scene import JobScene
 from ..rendering.render import render
+from ..reports.html import html_table
 from ..reports.report import Report
 from ..request import Request
+from ..scenes import DeviceScene
 from ..studies.judge import Judge
-from .html import html_table
 from .scenes import AnyDevice, device as device_of
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def plan(
     ['Hello', 'world']
     """
     request = Request(tol=tol, budget_s=budget_s, contrast_db=contrast_db)
-    if isinstance(scene, JobScene):
+    if isinstance(scene, DeviceScene):
         request = scene.request(request)
         device = scene.device if device is None else device
     if device is None:
@@ -303,7 +303,7 @@ class _Judged:
         try:
             yield from Judge(self.request).judged(self.plan)
         except PlanError as error:
-            if not isinstance(self.scene, JobScene):
+            if not isinstance(self.scene, DeviceScene):
                 raise
             raise self.scene.placed(error) from None
 

@@ -1,8 +1,8 @@
-"""What should be felt, on which device: texts, pictures, icons, textures and jobs as scenes."""
+"""What should be felt, on which device: texts, textures and jobs as scenes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -13,9 +13,7 @@ from pydantic import BaseModel, ValidationError
 from chainsim import Device, complaint_of, load_device, words_of
 from encoders import (
     GridShape,
-    PictureOptions,
     Scene,
-    Style,
     TargetPattern,
     TextOptions,
     TextScene,
@@ -23,13 +21,12 @@ from encoders import (
 )  # fmt: skip
 
 from ..errors import AppError
-from ..scenes import joined, picture_scene, pitched, still_scene, text_scene
+from ..scenes import DeviceScene, still_scene, text_scene
 
-__all__ = ["device", "icons", "image", "job", "text", "texture"]
+__all__ = ["USUAL_DEVICE", "AnyDevice", "device", "job", "shape_of", "text", "texture"]
 
 AnyDevice = Device | str | PathLike[str] | Mapping[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
-Picture = str | PathLike[str] | bytes
 USUAL_DEVICE = "paper-6x6"
 
 
@@ -110,96 +107,7 @@ def text(
     """
     profile = _device(device)
     given = source if isinstance(source, TextSource) else _source(source)
-    return text_scene(given, _shape(profile), replace(options or TextOptions(), **changes))
-
-
-def image(
-    files: Picture | Iterable[Picture],
-    device: AnyDevice = USUAL_DEVICE,
-    options: PictureOptions | None = None,
-    **changes: Any,
-) -> Scene:
-    """Pictures, one after another.
-
-    Parameters
-    ----------
-    files : path or bytes, or several
-        PNG, JPEG, GIF, WebP, BMP, TIFF or SVG.
-    device : Device, name, file or mapping
-        Whose grid and pitch the pictures are made for.
-    options : encoders.PictureOptions, optional
-        Style, fit, threshold and so on; the pitch is the device's.
-    **changes
-        Single options by their names in `encoders.PictureOptions`, such as ``style="photo"``.
-
-    Returns
-    -------
-    encoders.Scene
-        With a line on each picture in `parts`.
-
-    Raises
-    ------
-    encoders.EncodeError
-        When a picture cannot be read, or an option is out of range.
-
-    Examples
-    --------
-    >>> import dotwave as dw
-    >>> dw.image("samples/icons/heart.svg").parts
-    ('icon: heart.svg, similarity 0.88',)
-    """
-    profile = _device(device)
-    chosen = pitched(replace(options or PictureOptions(), **changes), profile)
-    several = [files] if isinstance(files, str | bytes | PathLike) else list(files)
-    if not several:
-        raise AppError("image: no picture was given; give at least one")
-    shape = _shape(profile)
-    return joined([picture_scene(_picture(one), shape, chosen) for one in several], shape)
-
-
-def icons(
-    sources: str | PathLike[str] | Iterable[str | PathLike[str]], device: AnyDevice = USUAL_DEVICE, **changes: Any
-) -> Scene:
-    """All icons of folders, globs, zip and tar archives, one after another, sorted by name.
-
-    `dotwave icons` makes sets of them that are told apart, and their pages; this shows each as its best pattern.
-
-    Parameters
-    ----------
-    sources : path, or several
-        Folders, globs, single pictures, archives.
-    device : Device, name, file or mapping
-        Whose grid and pitch the icons are made for.
-    **changes
-        Single options by their names in `encoders.PictureOptions`; the style is ``icon``.
-
-    Returns
-    -------
-    encoders.Scene
-        With a line on each icon in `parts`.
-
-    Raises
-    ------
-    dotwave.AppError, encoders.EncodeError
-        When there is no picture, or one of them cannot be used.
-
-    Examples
-    --------
-    >>> import dotwave as dw
-    >>> scene = dw.icons("samples/icons/[hl]*.svg")
-    >>> len(list(scene.frames)) == len(scene.parts)
-    True
-    """
-    from ..icon_sets.sources import find_icons, read_icons
-
-    several = [sources] if isinstance(sources, str | PathLike) else list(sources)
-    files = list(read_icons(find_icons([str(one) for one in several])))
-    for file in files:
-        if file.error:
-            raise AppError(f"{file.name}: {file.error}")
-    scene = image([file.data for file in files], device, **{"style": Style.ICON} | changes)
-    words = (f"icon: {file.name},{part.partition(',')[2]}" for file, part in zip(files, scene.parts, strict=True))
-    return replace(scene, parts=tuple(words))
+    return text_scene(given, shape_of(profile), replace(options or TextOptions(), **changes))
 
 
 def texture(
@@ -238,10 +146,10 @@ def texture(
     from ..jobs.texture import TexturePart
 
     part = _checked(TexturePart, dict(kind) | {"dwell_s": dwell_s}, "texture")
-    return still_scene(part.target(_shape(_device(device))), part.dwell_s, f"texture: {part.kind}")
+    return still_scene(part.target(shape_of(_device(device))), part.dwell_s, f"texture: {part.kind}")
 
 
-def job(path: str | PathLike[str]) -> Scene:
+def job(path: str | PathLike[str]) -> DeviceScene:
     """A job file: texts, pictures, textures and pauses, on its own device and with its own tolerance.
 
     Parameters
@@ -282,13 +190,10 @@ def _checked(model: type[Model], given: Mapping[str, Any], what: str) -> Model:
         raise AppError(f"{place}: {complaint.sentence}") from None
 
 
-def _shape(profile: Device) -> GridShape:
+def shape_of(profile: Device) -> GridShape:
+    """The grid that scenes for a device are laid out for."""
     return GridShape(profile.rows, profile.cols)
 
 
 def _source(source: str | PathLike[str]) -> TextSource:
     return TextSource.of_text(source) if isinstance(source, str) else TextSource.of_path(Path(source))
-
-
-def _picture(source: Picture) -> Path | bytes:
-    return source if isinstance(source, bytes) else Path(source)

@@ -72,7 +72,8 @@ def image(
     Example:
       dotwave image samples/icons/heart.svg -o heart.wav --explain steps
     """
-    from ..api.scenes import device as device_of, image as image_scene
+    from ..api.pictures import image as image_scene
+    from ..api.scenes import device as device_of
     from ..rendering.render import render as render_scene
     from ..rendering.steps import write_steps
     from ..request import request_of
@@ -173,7 +174,7 @@ def render(
     Example:
       dotwave render samples/jobs/mixed.yaml
     """
-    from ..rendering.render import render_job
+    from ..rendering.job import render_job
     from ..request import request_of
     from .options import place_of
 

@@ -14,8 +14,9 @@ from encoders import EncodeError, GridShape, Scene, Style, TargetPattern, TextOp
 from planner import PlanError
 
 from ..errors import AppError
+from ..pictures import picture_scene
 from ..request import Request
-from ..scenes import SceneFrames, joined, picture_scene, still_scene, text_scene
+from ..scenes import DeviceScene, SceneFrames, joined, still_scene, text_scene
 from .job import Item, Job, PicturePart, TextPart, locate_job
 from .paths import Reach
 
@@ -23,16 +24,15 @@ __all__ = ["JobScene", "read_job_scene"]
 
 
 @dataclass(frozen=True, repr=False)
-class JobScene(Scene):
+class JobScene(DeviceScene):
     """A job that was read and encoded: all its parts as one scene.
 
     Attributes
     ----------
-    located : the job, with its lines. device : to show it on. out : the file it names to write.
+    located : the job, with its lines. out : the file it names to write.
     """
 
     located: Located[Job] = field(kw_only=True)
-    device: Device = field(kw_only=True)
     out: Path | None = None
 
     @property

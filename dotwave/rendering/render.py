@@ -9,23 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from chainsim import Device, Outcome
-from drivers import FORMATS, FileError, WrittenPlan, check_suffix, write_plan
+from drivers import FORMATS, WrittenPlan, check_suffix, write_plan
 from encoders import Scene, TextScene
 from planner import FramePlan, Plan, PlanError, plan_scene
 
-from ..errors import AppError
-from ..jobs.scene import JobScene, read_job_scene
 from ..progress import progress
 from ..reports.report import Report
-from ..reports.scene import SceneReport
 from ..reports.text import TextReport
 from ..reports.totals import Totals, nearest_lines
 from ..request import Request
+from ..scenes import DeviceScene
 from ..studies.judge import Judge
 from .extent import extent_of, go_on
 from .text_findings import text_findings
 
-__all__ = ["render", "render_job"]
+__all__ = ["render"]
 
 
 class _Stopped(Exception):
@@ -58,41 +56,13 @@ def render(scene: Scene, device: Device, out: Path | None = None, request: Reque
     try:
         written = _carried_out(passage, out, request)
     except PlanError as error:
-        if not isinstance(scene, JobScene):
+        if not isinstance(scene, DeviceScene):
             raise
         raise scene.placed(error) from None
     report = _report(scene, passage, written, request)
     found = passage.judge.findings()
     seconds = time.perf_counter() - began
     return replace(report, reached=found.reached, met=found.met, beside=found.beside, seconds=seconds)
-
-
-def render_job(
-    path: Path, out: Path | None = None, request: Request | None = None, *, root: Path | None = None
-) -> Report:
-    """Carry out the job file `path`; `out` is written in place of the job's own output.
-
-    Parameters
-    ----------
-    request : what is asked, before what the job asks for.
-    root : the job, and what it names, lie below this folder, or are refused; None for anywhere.
-
-    Raises
-    ------
-    Declined
-        When a person was asked, and said no.
-    AppError, ChainError, DriverError, EncodeError, PlanError
-        When the job, or what it names, cannot be used.
-    """
-    began = time.perf_counter()
-    job = read_job_scene(path, root=root)
-    try:
-        report = render(job, job.device, out or job.out, job.request(request or Request()))
-    except FileError as error:
-        if out is not None:
-            raise
-        raise AppError(f"{job.located.at('output')}: {error}") from None
-    return replace(report, seconds=time.perf_counter() - began)
 
 
 def _carried_out(passage: _Passage, out: Path | None, request: Request) -> WrittenPlan | None:
@@ -169,4 +139,7 @@ def _report(scene: Scene, passage: _Passage, written: WrittenPlan | None, reques
             tables=tuple(scene.encoding["tables"]), text=scene.text_frames.source.text[:200], pages=totals.pages,
             undefined=found.undefined, split=found.split, differences=found.differences, notes=notes, **said,
         )  # fmt: skip
+    # Imported here: a text does without.
+    from ..reports.scene import SceneReport
+
     return SceneReport(parts=scene.parts, tolerance=request.tol, notes=tuple(passage.notes()), **said)

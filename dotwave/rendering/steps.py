@@ -11,7 +11,7 @@ from chainsim import Device
 from drivers import atomic_file, naming
 from encoders import GridShape, PictureOptions, explain_picture
 
-from ..scenes import pitched
+from ..pictures import pitched
 
 __all__ = ["write_steps"]
 

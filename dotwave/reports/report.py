@@ -11,13 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..plain import one_line
+from .html import html_facts
 from .printable import Printable
 from .totals import Spreading
 
 __all__ = ["Report", "margin_lines", "outcome_lines", "plain"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Report(ABC):
     """What was rendered and what the planner predicts for it.
 
@@ -67,6 +68,13 @@ class Report(ABC):
     def ok(self) -> bool:
         """Every frame can be made as asked, and a tolerance that was asked for was met."""
         return self.made and self.met
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{name} {count}" for name, count in self.outcomes.items())
+        return f"<{type(self).__name__} on {self.device}: {counts or 'no frame'}, {self.duration_s:.2f} s>"
+
+    def _repr_html_(self) -> str:
+        return html_facts(f"What was rendered for {self.device}", self.as_dict())
 
     def as_dict(self) -> dict[str, Any]:
         """The report in plain JSON types; a number that is not finite becomes null."""

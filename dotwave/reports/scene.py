@@ -10,7 +10,7 @@ from .report import Report, margin_lines, outcome_lines
 __all__ = ["SceneReport"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class SceneReport(Report):
     """What was rendered of a scene.
 

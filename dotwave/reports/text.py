@@ -37,7 +37,7 @@ AMPLITUDE_ERROR_LIMIT = 0.02
 LISTED = 20
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class TextReport(Report):
     """What was rendered of a text.
 
@@ -84,7 +84,7 @@ class TextReport(Report):
         yield f"Time taken: {self.seconds:.2f} s."
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FrameCheck:
     """What one frame of a written waveform does to the skin, from `settled_s` to `end_s`.
 
@@ -112,6 +112,10 @@ class FrameCheck:
     wanted_cells: str = ""
     felt_cells: str = ""
     text: str = ""
+
+    def __repr__(self) -> str:
+        error = f"error {100 * self.amplitude_error:.2f} %"
+        return f"FrameCheck(from {self.start_s:.2f} s, {_count(self.wrong_dots, 'wrong dot')}, {error})"
 
     @property
     def amplitude(self) -> Floats:

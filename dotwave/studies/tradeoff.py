@@ -13,6 +13,7 @@ from encoders import GridShape, Scene, TargetPattern, TextOptions, encode_text
 from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
 
 from ..errors import AppError
+from ..reports.html import html_table
 from ..reports.report import plain
 from ..request import FrameRequest, picture_name
 from ..source import text_source
@@ -53,11 +54,22 @@ def _of_job(path: Path, given: Device | None) -> tuple[Scene, Device, float]:
     return found, found.device, found.job.contrast_db
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ExplainReport:
     """What a scene requires."""
 
     required: Requirement
+
+    def __repr__(self) -> str:
+        return f"<ExplainReport: what the scene requires on {self.required.device}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (term.name, f"{term.effect:.1e}", "in" if term.included else "out", term.cost, term.why)
+            for term in self.required.terms
+        )
+        columns = ("term", "effect", "in or out", "cost, evaluations", "why")
+        return html_table(f"What this scene requires on {self.required.device}", columns, rows)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types; an effect without bound is null."""
