@@ -14,21 +14,15 @@ from drivers import read_waveform
 
 
 @pytest.mark.parametrize(
-    ("address", "given"),
-    [
-        ("controller:/dev/ttyACM0", {"port": "/dev/ttyACM0"}),
-        ("controller:socket://host:9", {"port": "socket://host:9"}),
-        ("drv2667:/dev/ttyUSB0", {"port": "/dev/ttyUSB0", "board": True}),
-        ("audio:", {"audio": ""}),
-    ],
+    "address", ["controller:/dev/ttyACM0", "controller:socket://host:9", "drv2667:/dev/ttyUSB0", "audio:"]
 )
-def test_an_address_says_what_plays(monkeypatch: pytest.MonkeyPatch, address: str, given: dict[str, Any]) -> None:
+def test_an_address_says_what_plays(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
     seen: list[Any] = []
     monkeypatch.setattr(module, "play", lambda path, **options: seen.append((path, options)))
     with dw.open(address, patience_s=3.0) as sink:
         sink.check("x.wav")
         sink.play(Path("x.wav"))
-    common = given | {"patience_s": 3.0}
+    common = {"to": address, "patience_s": 3.0}
     assert seen == [(Path("x.wav"), common | {"live": False}), (Path("x.wav"), common | {"live": True})]
 
 

@@ -14,13 +14,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Player", "open"]
 
-# Name of a sink -> the argument of `play` that takes its place, and what else is given.
-PLACES: dict[str, tuple[str, dict[str, Any]]] = {
-    "controller": ("port", {}),
-    "drv2667": ("port", {"board": True}),
-    "audio": ("audio", {}),
-}
-
 
 def open(address: str, **options: Any) -> Player:
     """What plays waveforms: a controller, the DRV2667 board, or a sound card.
@@ -30,7 +23,8 @@ def open(address: str, **options: Any) -> Player:
     Parameters
     ----------
     address : str
-        ``controller:/dev/ttyACM0``, ``drv2667:/dev/ttyUSB0``, ``audio:NAME``; `dotwave ports` lists serial ports.
+        ``controller:/dev/ttyACM0``, ``drv2667:/dev/ttyUSB0``, ``audio:NAME``, or a sink that another package offers;
+        `dotwave ports` lists serial ports.
     **options
         Of `dotwave play`: `baud`, `patience_s` (seconds), `firmware` of a board, `mapping` of a sound card.
 
@@ -52,12 +46,13 @@ def open(address: str, **options: Any) -> Player:
     ...     print(sink.check(wave).ok)
     True
     """
-    name, colon, place = address.partition(":")
-    if name not in PLACES or not colon:
-        known = ", ".join(f"{each}:..." for each in PLACES)
+    from drivers import sink_names
+
+    name, colon, _ = address.partition(":")
+    if name not in sink_names() or not colon:
+        known = ", ".join(f"{each}:..." for each in sink_names())
         raise AppError(f"{address}: expected one of {known}, such as controller:/dev/ttyACM0")
-    argument, others = PLACES[name]
-    return Player(address, {argument: place, **others, **options})
+    return Player(address, options)
 
 
 @dataclass(frozen=True)
@@ -148,5 +143,5 @@ class Player:
         from ..playing.play import play
 
         with on_disk(wave) as path:
-            report = play(path, live=live, **self.options)
+            report = play(path, live=live, to=self.address, **self.options)
         return report if isinstance(wave, str | PathLike) else replace(report, path=MEMORY)
