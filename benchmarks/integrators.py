@@ -37,7 +37,8 @@ class Way:
 
     Attributes
     ----------
-    settings : in words. lanes : chains that are integrated together.
+    settings : in words.
+    lanes : chains that are integrated together.
     make : the flow at a tolerance, for a number of rows.
     """
 

@@ -38,11 +38,14 @@ class Request:
 
     Attributes
     ----------
-    tol : largest deviation of an actuator, in units of full scale. budget_s : seconds for planning.
-    explain : list what the scene requires. pareto : list what a frame can be bought for.
+    tol : largest deviation of an actuator, in units of full scale.
+    budget_s : seconds for planning.
+    explain : list what the scene requires.
+    pareto : list what a frame can be bought for.
     contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
-    encoding : number format of samples. actuator : (row, col) that a haptic file of one actuator shows; None is the
-        mean over the grid. yes : do not ask before a very large file.
+    encoding : number format of samples.
+    actuator : (row, col) that a haptic file of one actuator shows; None is the mean over the grid.
+    yes : do not ask before a very large file.
     """
 
     tol: float | None = None

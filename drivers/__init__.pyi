@@ -66,10 +66,6 @@ from .protocol.host_session import (
     StreamReport as StreamReport,
     Timing as Timing,
 )
-from .protocol.messages import (
-    Ack as Ack,
-    Capabilities as Capabilities,
-)
 from .protocol.outgoing import (
     UnfitController as UnfitController,
     session_messages as session_messages,
@@ -89,6 +85,7 @@ from .protocol.pty_line import (
 from .protocol.record import (
     ArrivalRecorder as ArrivalRecorder,
 )
+from .protocol.replies import Ack as Ack, Capabilities as Capabilities
 from .protocol.virtual_controller import (
     VirtualController as VirtualController,
 )

@@ -37,7 +37,8 @@ class LimitError(DriverError, ValueError):
 
     Attributes
     ----------
-    channel : where. time_s : when, seconds from the start.
+    channel : where.
+    time_s : when, seconds from the start.
     value, limit : what was asked and what can be had, both in the unit of the message (V or V/s).
     """
 

@@ -33,13 +33,17 @@ class GateLimits:
 
     Attributes
     ----------
-    volts : modulus. slew_v_per_s : change between neighbouring samples times the rate; before the first sample
-        and after the last the outputs are at 0 V.
-    dc_volts : modulus of the mean over any window. duty : share of any window above `duty_level` of `volts`.
-    current_a : capacitance times slew, one channel. supply_a : the same, all channels together.
+    volts : modulus.
+    slew_v_per_s : change between neighbouring samples times the rate; before the first sample and after the last the
+        outputs are at 0 V.
+    dc_volts : modulus of the mean over any window.
+    duty : share of any window above `duty_level` of `volts`.
+    current_a : capacitance times slew, one channel.
+    supply_a : the same, all channels together.
     energy_j : heat in one actuator in any window, loss tangent times the energy that goes in and out of it.
     window_s : length of the windows, which begin every quarter of it; time outside the waveform counts as 0 V.
-    capacitance_f, loss : of one actuator. lam_max : of every link.
+    capacitance_f, loss : of one actuator.
+    lam_max : of every link.
     """
 
     volts: float
@@ -80,8 +84,10 @@ class GateRefusal(DriverError, ValueError):
 
     Attributes
     ----------
-    quantity : volts, slew, dc, duty, current, supply, energy or lam. channel : index, -1 for all together.
-    time_s : when. value, limit : in the unit of the message.
+    quantity : volts, slew, dc, duty, current, supply, energy or lam.
+    channel : index, -1 for all together.
+    time_s : when.
+    value, limit : in the unit of the message.
     """
 
     def __init__(self, message: str, *, quantity: str, channel: int, time_s: float, value: float, limit: float) -> None:
@@ -111,7 +117,9 @@ class Gate:
 
     Parameters
     ----------
-    limits : what must not be exceeded. channels : what each column is. rate_hz : samples per second.
+    limits : what must not be exceeded.
+    channels : what each column is.
+    rate_hz : samples per second.
     refused : how a refusal begins.
     """
 

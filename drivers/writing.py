@@ -23,8 +23,8 @@ class WrittenPlan:
 
     Attributes
     ----------
-    files : the samples and their manifest, or the haptic file. peak_volts : largest voltage of any channel, None where
-        no samples were written.
+    files : the samples and their manifest, or the haptic file.
+    peak_volts : largest voltage of any channel, None where no samples were written.
     """
 
     files: tuple[Path, ...]
@@ -45,8 +45,9 @@ def write_plan(
 
     Parameters
     ----------
-    encoding : number format of samples. actuator : (row, col) that a haptic file of one actuator shows; None is the
-        mean over the grid. progress : called with the seconds written so far, where there are samples.
+    encoding : number format of samples.
+    actuator : (row, col) that a haptic file of one actuator shows; None is the mean over the grid.
+    progress : called with the seconds written so far, where there are samples.
 
     Raises
     ------

@@ -74,7 +74,8 @@ def distinctness(codes: Codes, closer_than: int = APART) -> Distinctness:
 
     Parameters
     ----------
-    codes : uint8, shape (N, dots), of `felt_codes`. closer_than : pairs below this distance are listed.
+    codes : uint8, shape (N, dots), of `felt_codes`.
+    closer_than : pairs below this distance are listed.
     """
     count, dots = codes.shape
     nearest, distance = np.full(count, -1, np.int64), np.full(count, -1, np.int64)
@@ -133,7 +134,8 @@ class Choice:
 
     Attributes
     ----------
-    codes : uint8, shape (K, dots), all different, best first. similarity : float64, shape (K,).
+    codes : uint8, shape (K, dots), all different, best first.
+    similarity : float64, shape (K,).
     """
 
     codes: Codes

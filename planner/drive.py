@@ -67,8 +67,10 @@ def cubic(at: Floats, nodes: Floats, values: Numbers, slopes: Numbers) -> Number
 
     Parameters
     ----------
-    at : float64, shape (S,). nodes : float64, shape (K,), K > 1, not falling; two at one place are a jump.
-    values : float64 or complex128, shape (K, ...). slopes : the same per unit of `nodes`.
+    at : float64, shape (S,).
+    nodes : float64, shape (K,), K > 1, not falling; two at one place are a jump.
+    values : float64 or complex128, shape (K, ...).
+    slopes : the same per unit of `nodes`.
 
     Returns
     -------
@@ -105,7 +107,8 @@ class FirstOrderHold:
 
     Attributes
     ----------
-    sinc : of half a sample's phase. tilt : H', in tau.
+    sinc : of half a sample's phase.
+    tilt : H', in tau.
     """
 
     sinc: float
@@ -144,7 +147,9 @@ class DriveTone:
 
     Attributes
     ----------
-    omega : over f0. held : its phasor after the ramp. end_s : the ramp's length, -inf without one.
+    omega : over f0.
+    held : its phasor after the ramp.
+    end_s : the ramp's length, -inf without one.
     t_s, values, slopes : its nodes, as in `Ramp`; None where it is silent on the ramp, or its lines are straight.
     """
 
@@ -185,7 +190,8 @@ def samples(device: Device, point: OperatingPoint, ramp: Ramp | None, tau: Float
 
     Parameters
     ----------
-    tau : float64, shape (S,), S > 1, from the start of the ramp. start : of the ramp, tau from that of the whole plan.
+    tau : float64, shape (S,), S > 1, from the start of the ramp.
+    start : of the ramp, tau from that of the whole plan.
 
     Returns
     -------
@@ -279,7 +285,8 @@ def felt(z: Floats, carrier: Complexes, samples: int) -> Complexes:
 
     Parameters
     ----------
-    z : float64, shape (periods * samples, ...). carrier : complex128, ``e^{i omega tau}``, which fits `z`.
+    z : float64, shape (periods * samples, ...).
+    carrier : complex128, ``e^{i omega tau}``, which fits `z`.
 
     Returns
     -------

@@ -66,8 +66,8 @@ def family_of(
     Parameters
     ----------
     contrast_db : how far an unraised dot of a vibrating chain stays below a raised one.
-    kinds : the chains of a device whose chains have numbers of their own, each as a device. whole : the family on such
-        a device when `device` is one of them.
+    kinds : the chains of a device whose chains have numbers of their own, each as a device.
+    whole : the family on such a device when `device` is one of them.
     """
     family: type[PatternFamily] = getattr(import_module(row.module, __package__), row.kind)
     return family.of(device, contrast_db, kinds, whole)

@@ -78,8 +78,10 @@ class OperatingPoint:
     Attributes
     ----------
     epsilon : complex drive phasor (modulus = drive amplitude, argument = psi).
-    lam : float64, shape (n-1,), links. omega : drive frequency over f0 (1.0 where nothing vibrates).
-    phasor : complex128, shape (n,), predicted first harmonic, dimensionless. mean : float64, shape (n,).
+    lam : float64, shape (n-1,), links.
+    omega : drive frequency over f0 (1.0 where nothing vibrates).
+    phasor : complex128, shape (n,), predicted first harmonic, dimensionless.
+    mean : float64, shape (n,).
     bias : float64, shape (n,), DC force on each actuator.
     tones : further tones of the drive; `target` is then the largest amplitude that passes by, which the tones
         make in equal parts, side tones apart.

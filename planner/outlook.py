@@ -17,8 +17,10 @@ class TradePoint:
 
     Attributes
     ----------
-    omega : frequency over f0. volts : peak drive over the amplifier's.
-    expected, median : error under the spread in units of full scale. yield_ : share of draws within the tolerance.
+    omega : frequency over f0.
+    volts : peak drive over the amplifier's.
+    expected, median : error under the spread in units of full scale.
+    yield_ : share of draws within the tolerance.
     """
 
     omega: float
@@ -50,12 +52,14 @@ class FrameSpread:
     spread : relative standard deviations of frequency, damping, beta and lam.
     expected, median, quantile_90 : of the worst actuator's error.
     yield_ : share of draws with every actuator within `tolerance` and on its side of the dot threshold.
-    dots_right : share of draws with every actuator on its side of the threshold. draws : how many there were.
+    dots_right : share of draws with every actuator on its side of the threshold.
+    draws : how many there were.
     needed : what the spread must be multiplied by so that a plan for it has a yield of `wanted`; 1 where it is good
         enough, 0 where no accuracy tried is.
     aim : how far the plan itself aims beside the wish, so that the expected error is least.
-    worst : the worst chain as planned; trade : the same held by the closed form, at ever higher frequencies. None and
-        empty where no closed form makes its pattern.
+    worst : the worst chain as planned;
+    trade : the same held by the closed form, at ever higher frequencies. None and empty where no closed form makes its
+        pattern.
     """
 
     spread: tuple[float, float, float, float]

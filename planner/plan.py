@@ -29,7 +29,8 @@ class ToneRamp:
 
     Attributes
     ----------
-    omega : its frequency over f0. epsilon, epsilon_slope : complex128, shape (K,), as in `Ramp`.
+    omega : its frequency over f0.
+    epsilon, epsilon_slope : complex128, shape (K,), as in `Ramp`.
     """
 
     omega: float
@@ -50,8 +51,8 @@ class Ramp:
         start of the whole plan, omega that of the state it leads to; `epsilon_slope` per second. None when the
         drive stays zero.
     bias : float64, shape (K, n); `bias_slope` per second. None when no bias changes.
-    lam_t_s : float64, shape (L,); lam : float64, shape (L, n-1), the links. None when they jump to the new
-        state's values at the start of the frame.
+    lam_t_s : float64, shape (L,);
+    lam : float64, shape (L, n-1), the links. None when they jump to the new state's values at the start of the frame.
     lacking : one clause on what the device lacks for this way, empty when it can go it.
     tones : envelopes at other frequencies, which add to the drive.
     """

@@ -44,8 +44,8 @@ class Planner:
     Attributes
     ----------
     contrast_db : how far an unraised dot of a vibrating chain stays below a raised one.
-    kinds : where chains have numbers of their own, each of them as a device. whole : the planner of such a device when
-        `device` is one of them.
+    kinds : where chains have numbers of their own, each of them as a device.
+    whole : the planner of such a device when `device` is one of them.
     """
 
     device: Device
@@ -107,8 +107,8 @@ class Planner:
 
         Parameters
         ----------
-        leave : from `before` to rest. enter : from rest to `after`, which begins `wait_s` seconds after the start or
-            later.
+        leave : from `before` to rest.
+        enter : from rest to `after`, which begins `wait_s` seconds after the start or later.
         """
         if leave is None or enter is None:
             return leave or enter

@@ -28,7 +28,8 @@ class ChainTarget:
 
     Attributes
     ----------
-    amplitude : n numbers, in units of full scale. turn : radians by which the whole motion is turned.
+    amplitude : n numbers, in units of full scale.
+    turn : radians by which the whole motion is turned.
     """
 
     amplitude: tuple[float, ...]
@@ -90,7 +91,8 @@ class WaveTarget(ChainTarget):
     Attributes
     ----------
     phase : n numbers, radians, None where any will do; the first that is given is 0.
-    weight : n numbers, 0 = don't care. lam : of every link, given by other chains; None where it is free.
+    weight : n numbers, 0 = don't care.
+    lam : of every link, given by other chains; None where it is free.
     """
 
     phase: tuple[float | None, ...]
@@ -127,8 +129,9 @@ class WalkingTarget(ChainTarget):
     Attributes
     ----------
     weight : n numbers, 0 = don't care.
-    width : of a bar in actuators; None where it follows from the rate. rate_hz : bars that pass in a second; None where
-        that follows from the width. place : the column of the chain's first actuator.
+    width : of a bar in actuators; None where it follows from the rate.
+    rate_hz : bars that pass in a second; None where that follows from the width.
+    place : the column of the chain's first actuator.
     lam : of every link, given by other chains; None where it is free.
 
     Raises

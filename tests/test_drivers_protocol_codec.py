@@ -18,21 +18,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from drivers.protocol.cobs import FrameError, FrameSplitter, cobs_decode, cobs_encode
-from drivers.protocol.messages import (
-    Ack,
-    Bias,
-    Capabilities,
-    Flag,
-    LinkCoupling,
-    Mark,
-    Marked,
-    Refused,
-    SamplesMessage,
-    StartMessage,
-    State,
-    Tones,
-    WireTone,
-)
+from drivers.protocol.messages import Bias, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones, WireTone
 from drivers.protocol.packet import (
     LONGEST_FRAME,
     MAX_PAYLOAD,
@@ -45,6 +31,7 @@ from drivers.protocol.packet import (
     decode,
     encode,
 )
+from drivers.protocol.replies import Ack, Capabilities, Flag, Marked, Refused, State
 
 ROOT = Path(__file__).resolve().parent.parent
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]

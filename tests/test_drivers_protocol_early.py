@@ -18,21 +18,11 @@ import pytest
 from drivers.protocol.early import MOST_EARLY, EarlyPackets
 from drivers.protocol.faults import Faults, FaultyLine
 from drivers.protocol.host_session import HELLO, STOP, HostSession, Timing
-from drivers.protocol.messages import (
-    VERSION,
-    Ack,
-    Capabilities,
-    Flag,
-    LinkCoupling,
-    Mark,
-    Marked,
-    SamplesMessage,
-    StartMessage,
-    State,
-)
+from drivers.protocol.messages import VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
 from drivers.protocol.outgoing import End, Message
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
 from drivers.protocol.playout import ControllerSpec, Event
+from drivers.protocol.replies import Ack, Capabilities, Flag, Marked, State
 from drivers.protocol.under_way import UnderWay
 from drivers.protocol.virtual_controller import VirtualController
 

@@ -11,21 +11,11 @@ import pytest
 
 from drivers.protocol.faults import Faults, FaultWindow, FaultyLine
 from drivers.protocol.host_session import STOP, ControllerRefused, HostSession, SessionLost, Timing
-from drivers.protocol.messages import (
-    FULL_CODE,
-    Bias,
-    Capabilities,
-    LinkCoupling,
-    Mark,
-    SamplesMessage,
-    StartMessage,
-    State,
-    Tones,
-    WireTone,
-)
+from drivers.protocol.messages import FULL_CODE, Bias, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones, WireTone
 from drivers.protocol.outgoing import End, Message
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
 from drivers.protocol.playout import ControllerSpec, OutputBlock
+from drivers.protocol.replies import Capabilities, State
 from drivers.protocol.virtual_controller import VirtualController
 
 STEP_S = 0.001

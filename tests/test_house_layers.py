@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -174,3 +175,13 @@ def test_classes_of_the_upper_packages_have_names_of_their_own() -> None:
         name: found for name, found in places.items() if len(found) > 1 and any(f.startswith(upper) for f in found)
     }
     assert not twice
+
+
+@each_module
+def test_docstrings_say_one_parameter_a_line(path: Path) -> None:
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for node in ast.walk(TREES[path]):
+        text = (ast.get_docstring(node) or "") if isinstance(node, documented) else ""
+        for section in re.findall(r"(?:Parameters|Attributes)\n-+\n(.*?)(?:\n\n|\Z)", text, flags=re.DOTALL):
+            crowded = re.search(r"^\S.*?[.;] [\w*]+(?:, [\w*]+)* : ", section, flags=re.MULTILINE)
+            assert crowded is None, f"{path}: {crowded and crowded[0]}"

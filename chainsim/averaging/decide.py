@@ -51,8 +51,10 @@ class Decision:
 
     Attributes
     ----------
-    sure : bool, shape (N,). phasor : complex128, shape (N, n), amplitudes of the answer reached, as exact as the slow
-        flow is; NaN where it is not sure. stats : work of the whole batch.
+    sure : bool, shape (N,).
+    phasor : complex128, shape (N, n), amplitudes of the answer reached, as exact as the slow flow is; NaN where it is
+        not sure.
+    stats : work of the whole batch.
     """
 
     sure: Bools

@@ -41,10 +41,10 @@ class Lean:
 
     Attributes
     ----------
-    place : float64, shape (N, n), z0; NaN where the force holds none in the well. kappa : float64, shape (N, n),
-        3 beta z0.
-    mean : float64, shape (N, n, n), what turns kappa |A|^2/2 into -C. second : complex128, shape (N, n, n), what turns
-        kappa A^2/2 into -E.
+    place : float64, shape (N, n), z0; NaN where the force holds none in the well.
+    kappa : float64, shape (N, n), 3 beta z0.
+    mean : float64, shape (N, n, n), what turns kappa |A|^2/2 into -C.
+    second : complex128, shape (N, n, n), what turns kappa A^2/2 into -E.
     """
 
     place: Floats
@@ -59,13 +59,15 @@ class SlowFlow:
 
     Attributes
     ----------
-    beta : float64, shape (n,) or (1,), of the chain. omega : float64, shape (N, 1).
+    beta : float64, shape (n,) or (1,), of the chain.
+    omega : float64, shape (N, 1).
     law : who feeds whom.
     lam : float64, shape (N, n), links about which the linear part is exact.
     rate, weight, fast, slave : complex128, shape (N, n, n), S, W, R and R^-1 W (0 in order 1).
-    stiff : complex128, shape (N, n, n), Z. third : complex128, shape (N, n), what turns the drive of B into B; 0 in
-        order 1.
-    lean : None without constant forces. rounds : how often the slaved part is found from itself; 0 in order 1.
+    stiff : complex128, shape (N, n, n), Z.
+    third : complex128, shape (N, n), what turns the drive of B into B; 0 in order 1.
+    lean : None without constant forces.
+    rounds : how often the slaved part is found from itself; 0 in order 1.
     """
 
     beta: Floats

@@ -35,10 +35,15 @@ class Run:
 
     Attributes
     ----------
-    flow, drive : what moves them. slow : complex128, shape (N, n), slow parts. top : float64, shape (N, n), hilltops.
-    peak : float64, shape (N, n), the largest amplitude seen. payable : the settings that can be followed.
+    flow, drive : what moves them.
+    slow : complex128, shape (N, n), slow parts.
+    top : float64, shape (N, n), hilltops.
+    peak : float64, shape (N, n), the largest amplitude seen.
+    payable : the settings that can be followed.
     spent : bool, shape (N,), where the longest budget of steps did not do.
-    steps : int64, shape (N,), steps taken between two looks. look : tau between two looks. evals : work done.
+    steps : int64, shape (N,), steps taken between two looks.
+    look : tau between two looks.
+    evals : work done.
     """
 
     def __init__(self, chain: Chain, setting: Setting, care: float, load: Floats | float = 1.0) -> None:

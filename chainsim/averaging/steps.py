@@ -103,7 +103,8 @@ class Stretch:
 
     Attributes
     ----------
-    slow : complex128, shape (N, n), slow parts at its end. peak : float64, shape (N, n), the largest |A|^2 seen.
+    slow : complex128, shape (N, n), slow parts at its end.
+    peak : float64, shape (N, n), the largest |A|^2 seen.
     kept : the amplitudes after each step, complex128, shape (N, n) each, where they were asked for.
     """
 

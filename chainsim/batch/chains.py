@@ -159,8 +159,9 @@ def march_blocks(given: Given, found: Found, table: Floats, first: int, last: in
 
     Parameters
     ----------
-    table : `multipliers.nodes`. found : `largest` has to be 0 and `estimate` is set; NaN marks a setting whose
-        correction did not converge, its other entries are meaningless then.
+    table : `multipliers.nodes`.
+    found : `largest` has to be 0 and `estimate` is set; NaN marks a setting whose correction did not converge, its
+        other entries are meaningless then.
     """
     block = np.zeros(ROWS)
     quarter = 0.25 * given.delta * given.delta

@@ -119,7 +119,9 @@ def half_traces(block: Floats, table: Floats, quarter: float, sign: float) -> No
 
     Parameters
     ----------
-    block : with X, STIFF, OM2 filled; rows WORK are overwritten. table : `nodes`. quarter : delta^2/4.
+    block : with X, STIFF, OM2 filled; rows WORK are overwritten.
+    table : `nodes`.
+    quarter : delta^2/4.
     """
     for w in range(WIDTH):
         block[TRACE + w] = math.nan

@@ -56,7 +56,8 @@ class Fold:
 
     Attributes
     ----------
-    at : value of the parameter. phasor : complex128, shape (n,).
+    at : value of the parameter.
+    phasor : complex128, shape (n,).
     index : the fold lies between points index and index + 1 of the path.
     rising : whether the branch ends there for a parameter that rises; else it does for one that falls.
     """
@@ -73,10 +74,13 @@ class Path:
 
     Attributes
     ----------
-    parameter : which quantity changes. value : float64, shape (K,).
-    phasor : complex128, shape (K, n), first harmonics. mean : float64, shape (K, n).
+    parameter : which quantity changes.
+    value : float64, shape (K,).
+    phasor : complex128, shape (K, n), first harmonics.
+    mean : float64, shape (K, n).
     stable : bool, shape (K,), by the Floquet multipliers.
-    folds : in order. ending : why it stops.
+    folds : in order.
+    ending : why it stops.
     """
 
     parameter: Parameter

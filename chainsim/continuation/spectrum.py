@@ -66,7 +66,8 @@ def spectrum_curve(delta: float, lam: ArrayLike, phi: ArrayLike) -> Complexes:
 
     Parameters
     ----------
-    lam : float64, any shape. phi : float64, radians, broadcast against `lam`.
+    lam : float64, any shape.
+    phi : float64, radians, broadcast against `lam`.
 
     Returns
     -------

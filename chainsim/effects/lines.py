@@ -30,7 +30,8 @@ class Lines:
 
     Attributes
     ----------
-    index : int64, shape (L, T), the k_j. omega : float64, shape (L,), all > 0 and distinct.
+    index : int64, shape (L, T), the k_j.
+    omega : float64, shape (L,), all > 0 and distinct.
     """
 
     index: Wholes

@@ -28,7 +28,8 @@ class Motion:
 
     Attributes
     ----------
-    tau : float64, shape (K,). tip : float64, shape (K, n), tip displacement; shorter than asked where it escaped.
+    tau : float64, shape (K,).
+    tip : float64, shape (K, n), tip displacement; shorter than asked where it escaped.
     outcome : ok, or escaped (|z| passed 50/sqrt|beta|, or 1e9).
     stats : `rhs_evals` counts evaluations of one oscillator.
     """
@@ -97,8 +98,10 @@ def integrate_terms(
 
     Parameters
     ----------
-    duration : tau to cover. step : longest step in tau; errors fall with its fourth power, with play operators (which
-        have corners) and a slewing or limited amplifier with its second. every : steps between two kept instants.
+    duration : tau to cover.
+    step : longest step in tau; errors fall with its fourth power, with play operators (which have corners) and a
+        slewing or limited amplifier with its second.
+    every : steps between two kept instants.
 
     Raises
     ------

@@ -71,11 +71,15 @@ class Steady:
 
     Attributes
     ----------
-    outcome : ok, or why there is none. rung : which solver answered.
-    lines : the frequencies. amplitude : complex128, shape (L, n), NaN where unknown. mean : float64, shape (n,).
+    outcome : ok, or why there is none.
+    rung : which solver answered.
+    lines : the frequencies.
+    amplitude : complex128, shape (L, n), NaN where unknown.
+    mean : float64, shape (n,).
     error_estimate : relative to the largest amplitude or mean.
     stable : whether the motion was reached; None where that was not looked at.
-    beat : where it does not lock. drift : where creep is on and its end was within the budget.
+    beat : where it does not lock.
+    drift : where creep is on and its end was within the budget.
     """
 
     outcome: Outcome
@@ -98,7 +102,8 @@ def steady_with_terms(chain: Chain, setting: Setting, terms: Terms, *, tol: floa
 
     Parameters
     ----------
-    tol : relative to the largest amplitude. start : rest, or ramp (the drive is raised within 100/delta).
+    tol : relative to the largest amplitude.
+    start : rest, or ramp (the drive is raised within 100/delta).
 
     Raises
     ------

@@ -34,7 +34,8 @@ class TwoTones:
     Attributes
     ----------
     outcome : ok; escaped (it would pass a hilltop) or no_convergence, then NaN.
-    index : int64, shape (H, 2), (k1, k2). omega : float64, shape (H,), the lines' frequencies.
+    index : int64, shape (H, 2), (k1, k2).
+    omega : float64, shape (H,), the lines' frequencies.
     harmonics : complex128, shape (H, n), dimensionless amplitudes of the lines.
     error_estimate : distance to the answer with two orders more, relative to the largest line.
     """

@@ -24,8 +24,10 @@ class Basis:
 
     Attributes
     ----------
-    order : highest harmonic K. mean : whether the mean and even harmonics are in.
-    harmonics : float64, shape (H,). size : number d of coordinates.
+    order : highest harmonic K.
+    mean : whether the mean and even harmonics are in.
+    harmonics : float64, shape (H,).
+    size : number d of coordinates.
     values : float64, shape (S, d), z at the points from x.
     project : float64, shape (d, S), coordinates from values.
     bilinear : float64, shape (d * d, S + 3): Jacobian from [z^2, k, omega^2, delta omega], sign left out

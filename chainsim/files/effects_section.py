@@ -93,9 +93,11 @@ class TermsSection(_Part):
 
     Attributes
     ----------
-    hysteresis : kind bouc_wen (gain, loading, unloading) or play (radius, weight, base). creep : per_decade, first,
-        last, each. modes : omega, delta, gain of each. amplifier : bandwidth, and optionally slew and limit. tones :
-        epsilon, omega, phase of each tone beside the setting's own.
+    hysteresis : kind bouc_wen (gain, loading, unloading) or play (radius, weight, base).
+    creep : per_decade, first, last, each.
+    modes : omega, delta, gain of each.
+    amplifier : bandwidth, and optionally slew and limit.
+    tones : epsilon, omega, phase of each tone beside the setting's own.
     """
 
     hysteresis: _Hysteresis | None = None

@@ -86,10 +86,12 @@ class Simulation(_Part):
 
     Attributes
     ----------
-    chain : n or grid, delta, beta, and optionally stiffness, closure, kind. setting : epsilon, lam (in a grid lam_x
-        and lam_y), omega, and optionally preload, bias, phase.
+    chain : n or grid, delta, beta, and optionally stiffness, closure, kind.
+    setting : epsilon, lam (in a grid lam_x and lam_y), omega, and optionally preload, bias, phase.
     terms : what else the actuators do, see `TermsSection`; each off unless asked for.
-    rung : a name in `RUNGS` or auto. tol : wanted accuracy. start : rest, ramp or all.
+    rung : a name in `RUNGS` or auto.
+    tol : wanted accuracy.
+    start : rest, ramp or all.
     """
 
     chain: _Chain

@@ -97,7 +97,8 @@ class SettingSweep:
 
     Attributes
     ----------
-    chain : what was built. tol : wanted accuracy.
+    chain : what was built.
+    tol : wanted accuracy.
     from_rest : what a sudden drive reaches (rung auto), or the lower branch (rung harmonic_balance).
     columns : epsilon, lam, omega; float64, shape (a,), (b, 1 or links), (c,). As ranges each has its own length, the
         settings are all combinations and omega changes fastest; as a table (`shape` of one number) all have the same.

@@ -61,7 +61,8 @@ def joint_branches(chain: Chain, setting: Setting, *, tol: float, rung: str) -> 
 
     Parameters
     ----------
-    tol : relative to each answer's largest amplitude. rung : one_harmonic, harmonic_balance, or static (no drive).
+    tol : relative to each answer's largest amplitude.
+    rung : one_harmonic, harmonic_balance, or static (no drive).
 
     With bias or preload, and with rung static, the starts are continued from those without and scattered: the list is
     then never called complete.

@@ -63,7 +63,9 @@ class ActuatorSpread(_Part):
 
     Attributes
     ----------
-    frequency : of natural frequencies (0.01 is 1 %). damping : of delta. beta : of the cubic term.
+    frequency : of natural frequencies (0.01 is 1 %).
+    damping : of delta.
+    beta : of the cubic term.
     lam : of what a link makes of the lam it is set to.
     """
 

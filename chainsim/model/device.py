@@ -116,7 +116,8 @@ class Device(_Part):
 
     Attributes
     ----------
-    rows, cols : size of the grid. `pitch_m` : distance between neighbours in metres.
+    rows, cols : size of the grid.
+    `pitch_m` : distance between neighbours in metres.
     f0_hz : resonance of one actuator in hertz; tau = 2 pi f0_hz t.
     delta, beta : damping and cubic term of `chainsim.Chain`.
     length_m : metres per unit of z.

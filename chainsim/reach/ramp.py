@@ -26,7 +26,8 @@ def from_ramp(chain: Chain, setting: Setting, steady: Response, *, tol: float, m
 
     Parameters
     ----------
-    steady : answers on the branch from 0; `NO_CONVERGENCE` where it ends in a fold. tol : as in `solve`.
+    steady : answers on the branch from 0; `NO_CONVERGENCE` where it ends in a fold.
+    tol : as in `solve`.
     max_periods : drive periods of the full equations after which a setting is out of budget.
     """
     lost = np.flatnonzero((steady.outcome == Outcome.NO_CONVERGENCE) & (setting.epsilon != 0))

@@ -47,13 +47,15 @@ class GridIntegrator:
 
     Parameters
     ----------
-    shape : rows and columns of the grid. chain_length : actuators a chain; divides the columns.
+    shape : rows and columns of the grid.
+    chain_length : actuators a chain; divides the columns.
     delta, beta, stiffness : of `Chain`, a number, or float64 that fits (rows, cols): one for each actuator. The
         stiffness is the natural frequency squared, in units of f0.
     ring : whether each chain's last actuator feeds its first.
-    both_ways : whether every link also acts on the actuator before it. down : whether the chains of all rows that
-        stand one above another are one 2-D grid, each actuator also fed from the one above it. kind : of every link;
-        an amplifier pushes without pulling back, one way only.
+    both_ways : whether every link also acts on the actuator before it.
+    down : whether the chains of all rows that stand one above another are one 2-D grid, each actuator also fed from the
+        one above it.
+    kind : of every link; an amplifier pushes without pulling back, one way only.
     dtau : tau from a sample to the next, > 0. Long intervals are subdivided so that integration errors stay
         below 1e-6 of the amplitude at a resonance of Q = 200 and lam <= 1.
 

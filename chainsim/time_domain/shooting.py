@@ -29,7 +29,8 @@ class Orbits:
 
     Attributes
     ----------
-    found : bool, shape (L,). state : float64, shape (L, 2n), all q then all p at phase 0.
+    found : bool, shape (L,).
+    state : float64, shape (L, 2n), all q then all p at phase 0.
     harmonics : complex128, shape (L, 8, n), the mean and harmonics 1..7; NaN where not found.
     multipliers : complex128, shape (L, n, 2).
     defect : float64, shape (L,), last Newton correction relative to the orbit, worst oscillator.

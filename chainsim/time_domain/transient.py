@@ -38,7 +38,8 @@ class Settled:
 
     Attributes
     ----------
-    outcome : object array of `Outcome`, shape (N,). steps : int64, shape (N,), steps per period used.
+    outcome : object array of `Outcome`, shape (N,).
+    steps : int64, shape (N,), steps per period used.
     state : float64, shape (N, 2n), the reached orbit at phase 0 for those that are OK.
     phasor : complex128, shape (N, n), its first harmonic; NaN otherwise.
     periods, turns, kicks : work done over all settings.

@@ -28,12 +28,17 @@ class IconsReport:
 
     Attributes
     ----------
-    icons : sorted by name. device : name of the profile. distinct : whether patterns were chosen to differ.
+    icons : sorted by name.
+    device : name of the profile.
+    distinct : whether patterns were chosen to differ.
     closer_than, close : pairs (name, name, distance) nearer than that, the nearest first.
     pairs : how many pairs have each distance, from 0.
-    failed : name -> what is wrong with it. unfinished : names that were not reached; `complete` is then False.
-    worked : pieces of work done in this run, none of them done before. seconds : taken.
-    files : what was written. reached : sentences on a tolerance or a budget.
+    failed : name -> what is wrong with it.
+    unfinished : names that were not reached; `complete` is then False.
+    worked : pieces of work done in this run, none of them done before.
+    seconds : taken.
+    files : what was written.
+    reached : sentences on a tolerance or a budget.
     """
 
     icons: tuple[Icon, ...]

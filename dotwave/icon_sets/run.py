@@ -40,11 +40,16 @@ class IconOptions:
 
     Attributes
     ----------
-    device : profile name or file. distinct : choose patterns that are not alike. waveforms : write a .wav for each.
-    workers : processes, None for one a core. scheduler : address of a dask scheduler to work there instead.
-    closer_than : pairs of icons nearer than this are listed. dwell_s : length of a waveform's frame.
-    tol : largest predicted error of an icon that is ok, full scale; None for any. budget_s : seconds for the work on
-        the set; what is not begun then is left for the next run. None for any. yes : do not ask before very much.
+    device : profile name or file.
+    distinct : choose patterns that are not alike.
+    waveforms : write a .wav for each.
+    workers : processes, None for one a core.
+    scheduler : address of a dask scheduler to work there instead.
+    closer_than : pairs of icons nearer than this are listed.
+    dwell_s : length of a waveform's frame.
+    tol : largest predicted error of an icon that is ok, full scale; None for any.
+    budget_s : seconds for the work on the set; what is not begun then is left for the next run. None for any.
+    yes : do not ask before very much.
     icon_seconds : processor time that one icon may take, on this machine.
     """
 

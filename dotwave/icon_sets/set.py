@@ -38,7 +38,8 @@ class Pattern:
 
     Attributes
     ----------
-    amplitude : float64, shape (rows, cols), read-only, in units of full scale. similarity : with its figure.
+    amplitude : float64, shape (rows, cols), read-only, in units of full scale.
+    similarity : with its figure.
     """
 
     amplitude: Floats
@@ -51,10 +52,14 @@ class Icon:
 
     Attributes
     ----------
-    name : unique in the set. digest : "sha256:" and the hash of the picture. kind : its format.
-    pattern : what is felt. lost : similarity given up so that it differs from the others.
+    name : unique in the set.
+    digest : "sha256:" and the hash of the picture.
+    kind : its format.
+    pattern : what is felt.
+    lost : similarity given up so that it differs from the others.
     figure : uint8, shape (4 rows, 4 cols), 255 = figure: what the pattern should be like.
-    outcome, error, note : of the plan; "not_planned" when it was not reached. notes : of the reading.
+    outcome, error, note : of the plan; "not_planned" when it was not reached.
+    notes : of the reading.
     waveform : the .wav below the output folder, empty when there is none.
     nearest, distance : the icon that feels most alike, and by how many actuators it differs; empty and None
         in a set of one.

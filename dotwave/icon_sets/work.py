@@ -78,8 +78,11 @@ class Recipe:
 
     Attributes
     ----------
-    device : the hardware. options : of the encoder, with the number of candidates. contrast_db : of the planner.
-    encoding : of the samples. made_by : `versions` of the one who asks.
+    device : the hardware.
+    options : of the encoder, with the number of candidates.
+    contrast_db : of the planner.
+    encoding : of the samples.
+    made_by : `versions` of the one who asks.
     """
 
     device: Device
@@ -116,8 +119,10 @@ class Task:
 
     Attributes
     ----------
-    key : of its record. data : bytes of a picture (`encode_icons`). amplitude : pattern in units of full scale, row by
-        row (`plan_patterns`, `write_waves`). name : of the waveform's files, without suffix.
+    key : of its record.
+    data : bytes of a picture (`encode_icons`).
+    amplitude : pattern in units of full scale, row by row (`plan_patterns`, `write_waves`).
+    name : of the waveform's files, without suffix.
     """
 
     key: str

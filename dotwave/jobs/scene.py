@@ -29,7 +29,8 @@ class JobScene(DeviceScene):
 
     Attributes
     ----------
-    located : the job, with its lines. out : the file it names to write.
+    located : the job, with its lines.
+    out : the file it names to write.
     """
 
     located: Located[Job] = field(kw_only=True)
@@ -65,7 +66,8 @@ def read_job_scene(path: Path, *, root: Path | None = None, device: Device | Non
 
     Parameters
     ----------
-    root : nothing outside of this folder is read, or named as output; None for any. device : in place of the job's.
+    root : nothing outside of this folder is read, or named as output; None for any.
+    device : in place of the job's.
 
     Raises
     ------

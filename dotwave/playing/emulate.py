@@ -83,8 +83,11 @@ def emulate(
 
     Parameters
     ----------
-    device : profile name or file. link : a stable name for the port. record : a .wav for what arrives.
-    buffer_s, watchdog_s, drift_ppm : of the controller. faults : what to spoil, the same each time for a `seed`.
+    device : profile name or file.
+    link : a stable name for the port.
+    record : a .wav for what arrives.
+    buffer_s, watchdog_s, drift_ppm : of the controller.
+    faults : what to spoil, the same each time for a `seed`.
     out : where to draw; stderr by default. A terminal is redrawn, anything else gets the port's name only.
 
     Raises

@@ -36,8 +36,11 @@ class PlayReport:
 
     Attributes
     ----------
-    live : False after a dry run. sink : its name, or none. gate : how near the limits it comes.
-    said : what the sink says of it. seconds : wall time of playing.
+    live : False after a dry run.
+    sink : its name, or none.
+    gate : how near the limits it comes.
+    said : what the sink says of it.
+    seconds : wall time of playing.
     """
 
     path: str
@@ -137,9 +140,12 @@ def play(
 
     Parameters
     ----------
-    port : of the controller, or with `board` of the DRV2667 board. audio : a sound card's name or number.
-    to : any sink, as ``name:place``. limits : of the actuators and the amplifier where they are known; None: those
-    of the profile. options : of the sink (`drivers.open_sink`); None is left out.
+    port : of the controller, or with `board` of the DRV2667 board.
+    audio : a sound card's name or number.
+    to : any sink, as ``name:place``.
+    limits : of the actuators and the amplifier where they are known; None: those of the
+        profile.
+    options : of the sink (`drivers.open_sink`); None is left out.
 
     Raises
     ------

@@ -76,7 +76,8 @@ def go_on(extent: Extent, out: Path, *, yes: bool) -> None:
 
     Parameters
     ----------
-    out : a file or folder to be. yes : do not ask.
+    out : a file or folder to be.
+    yes : do not ask.
 
     Raises
     ------

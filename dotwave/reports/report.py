@@ -24,14 +24,20 @@ class Report(ABC):
 
     Attributes
     ----------
-    device : name of the profile. frames : how many were planned. duration_s : length of the waveform in seconds.
+    device : name of the profile.
+    frames : how many were planned.
+    duration_s : length of the waveform in seconds.
     files : what was written; empty when no output was asked for.
     peak_volts, limit_volts : largest voltage of any channel, and what the amplifier can give.
-    ramp_s : longest way into a frame. error : predicted worst deviation in units of full scale.
-    outcomes : outcome -> number of frames. notes : sentences a person should read. seconds : time taken.
-    well : largest deflection over the limit of the softening well, noise_gain : largest magnification of
-        disturbances of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest
-        Floquet multiplier of a wave (all as in `planner.Margins`). spread : of the frame that suffers most.
+    ramp_s : longest way into a frame.
+    error : predicted worst deviation in units of full scale.
+    outcomes : outcome -> number of frames.
+    notes : sentences a person should read.
+    seconds : time taken.
+    well : largest deflection over the limit of the softening well, noise_gain : largest magnification of disturbances
+        of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest Floquet
+        multiplier of a wave (all as in `planner.Margins`).
+    spread : of the frame that suffers most.
     reached, met : sentences on a tolerance and a budget, and whether the tolerance was met.
     beside : further reports that were asked for, by their names.
     """

@@ -16,7 +16,8 @@ class SceneReport(Report):
 
     Attributes
     ----------
-    parts : one line on each thing shown. tolerance : largest error that is ok, in units of full scale; None for any.
+    parts : one line on each thing shown.
+    tolerance : largest error that is ok, in units of full scale; None for any.
     """
 
     KEYS = (

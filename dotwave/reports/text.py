@@ -43,9 +43,12 @@ class TextReport(Report):
 
     Attributes
     ----------
-    tables : liblouis tables. text : the first characters of the source. pages : how many.
+    tables : liblouis tables.
+    text : the first characters of the source.
+    pages : how many.
     undefined : characters the table cannot write and what was shown instead.
-    split : words cut at a page's end. differences : what back-translation does not give again.
+    split : words cut at a page's end.
+    differences : what back-translation does not give again.
     """
 
     KEYS = (
@@ -90,13 +93,15 @@ class FrameCheck:
 
     Attributes
     ----------
-    page : page of the frame. outcome : what the planner said of it.
+    page : page of the frame.
+    outcome : what the planner said of it.
     target, felt : float64, shape (rows, cols), amplitude in units of full scale.
     wrong_dots : actuators felt on the wrong side of the threshold.
     contrast_db : weakest wanted dot over the strongest unwanted one; None when the frame lacks either, or has levels.
     amplitude_error : worst deviation from `target`, in units of full scale; of the complex amplitude where phases
         are wanted, and of the worst tone where there are several.
-    wanted_cells, felt_cells : Unicode Braille, lines separated by a newline. text : the source's span.
+    wanted_cells, felt_cells : Unicode Braille, lines separated by a newline.
+    text : the source's span.
     """
 
     page: int
@@ -160,13 +165,17 @@ class VerifyReport:
 
     Attributes
     ----------
-    path : the samples file. device : name of the profile in the manifest.
-    frames : one `FrameCheck` each, in order. samples : how many were integrated.
+    path : the samples file.
+    device : name of the profile in the manifest.
+    frames : one `FrameCheck` each, in order.
+    samples : how many were integrated.
     source_text, felt_text : what was rendered, and what the felt cells say when translated back.
     text_equal : whether they are the same, case and white space apart; None when it is not text.
     cells_equal : whether the felt cells are those the table writes for the source; decides where a table
         cannot be translated back. None when it is not text.
-    differences : where they differ. notes : sentences a person should read. seconds : time taken.
+    differences : where they differ.
+    notes : sentences a person should read.
+    seconds : time taken.
     """
 
     path: str

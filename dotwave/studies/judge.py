@@ -43,7 +43,8 @@ class Judge:
 
     Attributes
     ----------
-    request : what a person asks for. planning_s : seconds that planning has taken, by the clock.
+    request : what a person asks for.
+    planning_s : seconds that planning has taken, by the clock.
     """
 
     def __init__(self, request: Request | None = None, clock: Callable[[], float] = time.perf_counter) -> None:

@@ -75,8 +75,9 @@ def run_sweep(
 
     Parameters
     ----------
-    only : which of `FIELDS` to write. workers : processes that solve chunks side by side (each uses all cores where
-        it can). units : size of a chunk, in `chainsim.unit_of` settings.
+    only : which of `FIELDS` to write.
+    workers : processes that solve chunks side by side (each uses all cores where it can).
+    units : size of a chunk, in `chainsim.unit_of` settings.
 
     Raises
     ------

@@ -27,7 +27,8 @@ class HapticCurves:
 
     Attributes
     ----------
-    time_s : float64, shape (K,), rising, first 0. level : float64, shape (K, rows, cols), 0..1 of full scale.
+    time_s : float64, shape (K,), rising, first 0.
+    level : float64, shape (K, rows, cols), 0..1 of full scale.
     phase : float64, shape (K, rows, cols), radians of each actuator's vibration against the carrier.
     frequency_hz : float64, shape (rows,), of each row's drive.
     """

@@ -25,7 +25,8 @@ class Format:
 
     Attributes
     ----------
-    words : what it is for and what it loses. writer, reader : modules of this package, imported only for such a file.
+    words : what it is for and what it loses.
+    writer, reader : modules of this package, imported only for such a file.
     sample_bytes : number format -> bytes of a sample, the fewest and the most; empty where there are no samples.
     """
 

@@ -43,7 +43,9 @@ class WavWriter:
 
     Parameters
     ----------
-    file : seekable, at its start. channels : what each column is. rate_hz : samples per second.
+    file : seekable, at its start.
+    channels : what each column is.
+    rate_hz : samples per second.
     riff_limit : bytes above which the header is RF64.
 
     Raises

@@ -40,7 +40,10 @@ class WavReader:
 
     Attributes
     ----------
-    path : the file. rate_hz : samples per second. channels : how many. samples : per channel.
+    path : the file.
+    rate_hz : samples per second.
+    channels : how many.
+    samples : per channel.
     encoding : pcm16, pcm24, pcm32, float32 or float64.
     volts_per_unit : float64, shape (channels,), read-only, volts for a stored full scale of 1.
     """

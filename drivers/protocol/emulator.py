@@ -14,10 +14,10 @@ from chainsim import Device
 
 from .faults import Faults, FaultyLine
 from .felt import FeltGrid
-from .messages import State
 from .playout import ControllerSpec, OutputBlock
 from .pty_line import PtyLine
 from .record import ArrivalRecorder, CutShort
+from .replies import State
 from .virtual_controller import VirtualController
 
 __all__ = ["Emulator", "EmulatorStatus"]
@@ -33,10 +33,14 @@ class EmulatorStatus:
 
     Attributes
     ----------
-    session : of the host, 0 for none. played_s, stored_s : of the stream. peak_volts : of the last step.
+    session : of the host, 0 for none.
+    played_s, stored_s : of the stream.
+    peak_volts : of the last step.
     levels : float64, shape (rows, cols), what is felt in units of full scale.
-    bad : frames that were no packet. mischief : packets dropped, corrupted or duplicated on purpose.
-    slipped_s : time left out because the machine was busy. recorded : complete sessions written.
+    bad : frames that were no packet.
+    mischief : packets dropped, corrupted or duplicated on purpose.
+    slipped_s : time left out because the machine was busy.
+    recorded : complete sessions written.
     cut_short : the last session that began, when a recorder saw it cut short.
     """
 
@@ -64,7 +68,9 @@ class Emulator:
 
     Parameters
     ----------
-    link : a stable name for the port. record : a .wav for what arrives. on_output : gets what goes out.
+    link : a stable name for the port.
+    record : a .wav for what arrives.
+    on_output : gets what goes out.
 
     Raises
     ------

@@ -29,8 +29,10 @@ class Faults:
 
     Attributes
     ----------
-    drop, corrupt, duplicate : share of packets, 0..1. delay_s : every packet is so late.
-    stall : packets wait while it lasts. disconnect : everything is lost while it lasts.
+    drop, corrupt, duplicate : share of packets, 0..1.
+    delay_s : every packet is so late.
+    stall : packets wait while it lasts.
+    disconnect : everything is lost while it lasts.
     """
 
     drop: float = 0.0

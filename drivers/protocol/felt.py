@@ -24,7 +24,8 @@ class FeltGrid:
 
     Parameters
     ----------
-    device : the hardware. rate_hz : samples per true second.
+    device : the hardware.
+    rate_hz : samples per true second.
     """
 
     def __init__(self, device: Device, rate_hz: float) -> None:

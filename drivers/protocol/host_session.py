@@ -9,9 +9,10 @@ from enum import Enum
 
 from ..errors import DriverError
 from .cobs import DELIMITER
-from .messages import VERSION, Ack, Capabilities, Flag, Marked, Refused, SamplesMessage, StartMessage, State
+from .messages import VERSION, SamplesMessage, StartMessage
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
+from .replies import Ack, Capabilities, Flag, Marked, Refused, State
 from .under_way import UnderWay
 
 __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "Timing"]
@@ -41,8 +42,11 @@ class Timing:
 
     Attributes
     ----------
-    heartbeat_s : it is never silent for longer. resend_s : without progress it sends again after this.
-    hello_s : and greets again after this. window : packets under way, at most 32. burst_bytes : sent at a time.
+    heartbeat_s : it is never silent for longer.
+    resend_s : without progress it sends again after this.
+    hello_s : and greets again after this.
+    window : packets under way, at most 32.
+    burst_bytes : sent at a time.
     """
 
     heartbeat_s: float = 0.025
@@ -58,14 +62,18 @@ class StreamReport:
 
     Attributes
     ----------
-    samples, packets : acknowledged. resent : packets sent again. reconnects : times the line came back.
-    underruns : times the controller's buffer ran dry. lost_s : seconds the output was held.
+    samples, packets : acknowledged.
+    resent : packets sent again.
+    reconnects : times the line came back.
+    underruns : times the controller's buffer ran dry.
+    lost_s : seconds the output was held.
     bad_there, bad_here : frames that were no packet, at the controller and here.
     late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first.
     reported_late_s : the same by the host's clock when the report came, so the line's delay is in it.
     least_buffer_s : smallest store in the controller between its first sample and the last one sent.
-    buffer_s : what the controller has room for. longest_pause_s : longest time in which the host sent nothing, because
-        its machine was busy with other things or the line took nothing.
+    buffer_s : what the controller has room for.
+    longest_pause_s : longest time in which the host sent nothing, because its machine was busy with other things or the
+        line took nothing.
     """
 
     samples: int = 0
@@ -96,7 +104,8 @@ class HostSession:
 
     Parameters
     ----------
-    make : gives the messages for the controller that answers. session : any number from 1 to 2^32 - 1.
+    make : gives the messages for the controller that answers.
+    session : any number from 1 to 2^32 - 1.
     """
 
     def __init__(self, make: Callable[[Capabilities], Iterator[Message]], *, session: int, timing: Timing) -> None:

@@ -14,10 +14,11 @@ from ..errors import DriverError
 from ..formats.samples import SampleReader
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
-from .messages import FULL_CODE, VERSION, Capabilities, LinkCoupling, Mark, SamplesMessage, StartMessage
+from .messages import FULL_CODE, VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
+from .replies import Capabilities
 
 __all__ = ["End", "Message", "UnfitController", "check_fit", "session_messages"]
 

@@ -85,7 +85,8 @@ class Packet:
 
     Attributes
     ----------
-    kind : what it is. number : place in the session of an ordered packet, 0 for the others (0 .. 2^32 - 1).
+    kind : what it is.
+    number : place in the session of an ordered packet, 0 for the others (0 .. 2^32 - 1).
     payload : 0 to MAX_PAYLOAD bytes, of the length `SHAPES` gives its kind.
     """
 

@@ -14,7 +14,8 @@ from chainsim import Device
 
 from ..channels import channels_of
 from .early import MOST_EARLY
-from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Marked, State, Tones
+from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Tones
+from .replies import Marked, State
 from .synthesis import Glide, ToneMix
 
 __all__ = ["BUFFER_S", "ControllerSpec", "Event", "OutputBlock", "Playout"]
@@ -33,9 +34,13 @@ class ControllerSpec:
 
     Attributes
     ----------
-    buffer_samples, event_slots : room. full_volts : volts of the largest code. lam_step, lam_max : links.
-    watchdog_s : silence after which the output is at zero. ramp_s : time the ramp to zero takes, <= watchdog_s.
-    drift_ppm : how much faster than nominal its sample clock runs. early_packets : kept for their turn, 0 to 32.
+    buffer_samples, event_slots : room.
+    full_volts : volts of the largest code.
+    lam_step, lam_max : links.
+    watchdog_s : silence after which the output is at zero.
+    ramp_s : time the ramp to zero takes, <= watchdog_s.
+    drift_ppm : how much faster than nominal its sample clock runs.
+    early_packets : kept for their turn, 0 to 32.
     """
 
     rows: int
@@ -84,8 +89,11 @@ class OutputBlock:
 
     Attributes
     ----------
-    time_s : of the first sample. volts : float64, shape (S, channels). played : samples of the stream before it.
-    lam : float64, shape (S, rows, cols), column 0 is 0. live : False while the output is held or ramps to zero.
+    time_s : of the first sample.
+    volts : float64, shape (S, channels).
+    played : samples of the stream before it.
+    lam : float64, shape (S, rows, cols), column 0 is 0.
+    live : False while the output is held or ramps to zero.
     """
 
     time_s: float
@@ -100,8 +108,11 @@ class Playout:
 
     Attributes
     ----------
-    state : what the output does. alive : whether the host is heard; without it nothing starts.
-    received, played : samples of the stream. events_done : events carried out. underruns : how often it ran dry.
+    state : what the output does.
+    alive : whether the host is heard; without it nothing starts.
+    received, played : samples of the stream.
+    events_done : events carried out.
+    underruns : how often it ran dry.
     held_s : seconds held since the stream began to play.
     """
 

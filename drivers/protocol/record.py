@@ -76,11 +76,13 @@ class ArrivalRecorder:
 
     Attributes
     ----------
-    finished : sessions written that were complete. cut_short : the last session, when it was cut short.
+    finished : sessions written that were complete.
+    cut_short : the last session, when it was cut short.
 
     Parameters
     ----------
-    device : the hardware the controller stands for. path : the .wav.
+    device : the hardware the controller stands for.
+    path : the .wav.
 
     Raises
     ------

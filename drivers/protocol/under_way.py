@@ -32,12 +32,14 @@ class UnderWay:
 
     Parameters
     ----------
-    most : packets. resend_s : without progress all that is missing is sent again after this, or after two round trips
-        where these take longer.
+    most : packets.
+    resend_s : without progress all that is missing is sent again after this, or after two round trips where these take
+        longer.
 
     Attributes
     ----------
-    packets, samples : acknowledged. resent : packets sent again.
+    packets, samples : acknowledged.
+    resent : packets sent again.
     """
 
     def __init__(self, most: int, resend_s: float) -> None:

@@ -12,23 +12,10 @@ from functools import partial
 from typing import Protocol
 
 from .early import EarlyPackets
-from .messages import (
-    VERSION,
-    Ack,
-    Bias,
-    Capabilities,
-    Codes,
-    Flag,
-    LinkCoupling,
-    Mark,
-    Refused,
-    SamplesMessage,
-    StartMessage,
-    State,
-    Tones,
-)
+from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
 from .packet import MAX_PAYLOAD, ORDERED, Kind, Packet, PacketReader, encode
 from .playout import ControllerSpec, Event, OutputBlock, Playout
+from .replies import Ack, Capabilities, Flag, Refused, State
 
 __all__ = ["Recorder", "VirtualController"]
 
@@ -64,8 +51,10 @@ class VirtualController:
 
     Parameters
     ----------
-    spec : what it is built for. now : seconds, any origin; all later times must not be before it.
-    name : for its greeting. on_output : gets every block that goes out.
+    spec : what it is built for.
+    now : seconds, any origin; all later times must not be before it.
+    name : for its greeting.
+    on_output : gets every block that goes out.
     recorder : gets everything that arrives, once and in order.
     """
 

@@ -40,7 +40,8 @@ class SoundCard:
 
     Attributes
     ----------
-    card : name or number for PortAudio, '' for its default. mapping : ``channel:output,...``, as `parse_outputs`.
+    card : name or number for PortAudio, '' for its default.
+    mapping : ``channel:output,...``, as `parse_outputs`.
     """
 
     card: str
@@ -97,7 +98,8 @@ def play_audio(
 
     Parameters
     ----------
-    device : name or number for PortAudio, None for its default. outputs : of each channel.
+    device : name or number for PortAudio, None for its default.
+    outputs : of each channel.
     progress : gets the seconds handed over.
 
     Raises

@@ -27,8 +27,10 @@ class SinkReport:
 
     Attributes
     ----------
-    ok : False when the output was held up on its way. facts : keys of the JSON report and what stands there, of
-    plain JSON types. lines : the same as sentences. notes : what else a person should know or do.
+    ok : False when the output was held up on its way.
+    facts : keys of the JSON report and what stands there, of plain JSON types.
+    lines : the same as sentences.
+    notes : what else a person should know or do.
     """
 
     ok: bool = True

@@ -22,7 +22,9 @@ class Board:
 
     Attributes
     ----------
-    port : such as /dev/ttyUSB0. baud : bits per second. firmware : what runs on the board.
+    port : such as /dev/ttyUSB0.
+    baud : bits per second.
+    firmware : what runs on the board.
     """
 
     port: str

@@ -58,7 +58,8 @@ class BoardEmulator:
 
     Attributes
     ----------
-    dots : bool, shape (rows, cols), what stands. characters : what was played as a character, in order.
+    dots : bool, shape (rows, cols), what stands.
+    characters : what was played as a character, in order.
     lost : bytes that found the input buffer full.
     """
 
@@ -137,7 +138,8 @@ def play_grid_lines(
 
     Parameters
     ----------
-    lines : (seconds from now, bytes) in order; empty bytes only wait. progress : gets the seconds played.
+    lines : (seconds from now, bytes) in order; empty bytes only wait.
+    progress : gets the seconds played.
 
     Raises
     ------

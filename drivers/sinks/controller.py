@@ -25,7 +25,8 @@ class Controller:
 
     Attributes
     ----------
-    port : such as /dev/ttyACM0. baud : bits per second, None: the controller's own.
+    port : such as /dev/ttyACM0.
+    baud : bits per second, None: the controller's own.
     patience_s : how long to wait for a controller that is not heard.
     """
 

@@ -43,7 +43,9 @@ class SynthRecord:
 
     Attributes
     ----------
-    amplitude : 0..255, of the gain's peak volts. frequency : 1..255, in steps of 7.8125 Hz. cycles : 1..255.
+    amplitude : 0..255, of the gain's peak volts.
+    frequency : 1..255, in steps of 7.8125 Hz.
+    cycles : 1..255.
     envelope : ramp-up nibble times 16 plus ramp-down nibble.
     """
 

@@ -58,7 +58,8 @@ def run_session(
 
     Parameters
     ----------
-    open_line : opens the line anew each time. patience_s : how long to try without hearing anything.
+    open_line : opens the line anew each time.
+    patience_s : how long to try without hearing anything.
     progress : gets the seconds played.
 
     Raises

@@ -48,9 +48,11 @@ class BoardFrame:
 
     Attributes
     ----------
-    start_s, duration_s : when and for how long. dots : bool, shape (6, 6), read-only, what `~` lines can say.
+    start_s, duration_s : when and for how long.
+    dots : bool, shape (6, 6), read-only, what `~` lines can say.
     records : socket -> what its chip plays; silent chips are left out.
-    load_s : time the I2C bus takes to load it. skew_s : from the first chip that starts to the last.
+    load_s : time the I2C bus takes to load it.
+    skew_s : from the first chip that starts to the last.
     """
 
     start_s: float
@@ -72,7 +74,8 @@ class BoardPlan:
 
     Attributes
     ----------
-    gain : register 0x01. frequency_error_hz : largest difference to the planned drive.
+    gain : register 0x01.
+    frequency_error_hz : largest difference to the planned drive.
     level_error : largest error of the felt level from the amplitude byte, in units of full scale.
     """
 

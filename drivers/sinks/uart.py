@@ -62,7 +62,8 @@ class Uart:
 
     Parameters
     ----------
-    name : such as /dev/ttyACM0, COM3, or the pty that `dotwave emulate` names. baud : bits per second.
+    name : such as /dev/ttyACM0, COM3, or the pty that `dotwave emulate` names.
+    baud : bits per second.
 
     Raises
     ------

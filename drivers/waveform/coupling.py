@@ -25,7 +25,8 @@ class CouplingEvent:
 
     Attributes
     ----------
-    t_s : when, seconds. row : which.
+    t_s : when, seconds.
+    row : which.
     lam : cols - 1 numbers, ``lam[m - 1]`` couples actuator m-1 into m; 0 between chains.
     ramp_s : seconds that the linear change from the present value to `lam` takes; 0 is a jump.
     """
@@ -103,7 +104,8 @@ class LamTrack:
 
     Parameters
     ----------
-    events : by time within each row. rows, cols : the grid.
+    events : by time within each row.
+    rows, cols : the grid.
     """
 
     def __init__(self, events: Iterable[CouplingEvent], rows: int, cols: int) -> None:

@@ -36,9 +36,13 @@ class WrittenWaveform:
 
     Attributes
     ----------
-    samples_path, manifest_path : the two files. frames : how many frames the manifest has.
-    samples : per channel. duration_s : seconds. digest : "sha256:" and the hash of the samples file.
-    peak_volts : float64, shape (channels,), read-only, volts. peak_slew_v_per_s : of any channel.
+    samples_path, manifest_path : the two files.
+    frames : how many frames the manifest has.
+    samples : per channel.
+    duration_s : seconds.
+    digest : "sha256:" and the hash of the samples file.
+    peak_volts : float64, shape (channels,), read-only, volts.
+    peak_slew_v_per_s : of any channel.
     """
 
     samples_path: Path

@@ -50,8 +50,10 @@ class FrameMark:
         with one omega may all be shifted alike.
     moving : for each row whether its target is an amplitude at omega; else it is a deflection.
     target : float64, shape (rows, cols), read-only, amplitude in units of full scale.
-    cells, text : what is shown, as Unicode Braille and as source text. outcome : how planning it went.
-    page : frames of one page are superposed by the reader. span : (start, end) of `text` in the source.
+    cells, text : what is shown, as Unicode Braille and as source text.
+    outcome : how planning it went.
+    page : frames of one page are superposed by the reader.
+    span : (start, end) of `text` in the source.
     """
 
     start_s: float
@@ -75,9 +77,12 @@ class Manifest:
 
     Attributes
     ----------
-    samples_file : name of the file of samples, in the same folder. samples : its length per channel.
+    samples_file : name of the file of samples, in the same folder.
+    samples : its length per channel.
     digest : "sha256:" and the hash of that file's bytes.
-    coupling : events by time within each row. frames : in order of time. encoding : from the scene.
+    coupling : events by time within each row.
+    frames : in order of time.
+    encoding : from the scene.
     """
 
     samples_file: str
@@ -164,7 +169,8 @@ class ManifestWriter:
 
     Parameters
     ----------
-    device : the hardware. path : where the manifest will be, for messages.
+    device : the hardware.
+    path : where the manifest will be, for messages.
     """
 
     def __init__(self, device: Device, path: Path) -> None:

@@ -38,7 +38,8 @@ class Waveform:
 
     Attributes
     ----------
-    device : the hardware. channels : what each column of a block is.
+    device : the hardware.
+    channels : what each column of a block is.
     frames : the plan's frames; they are drawn as the samples are asked for.
     """
 

@@ -175,7 +175,8 @@ def paginate(words: Iterable[PlacedWord], layout: Layout, breaks: Breaks, note: 
     Parameters
     ----------
     words : in reading order.
-    breaks : cells of a word before which a hyphen may stand. note : told of every break inside a word.
+    breaks : cells of a word before which a hyphen may stand.
+    note : told of every break inside a word.
     """
     filler = _Filler(layout)
     for word in words:

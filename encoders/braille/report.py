@@ -19,7 +19,8 @@ class UndefinedUse:
     action : ``named``, ``respelled`` (a compatible form is written), ``dropped`` or ``six dots`` (dots 7
         and 8 are left out).
     written : what is written in its place.
-    first : position of the first one in the source. count : how many there are.
+    first : position of the first one in the source.
+    count : how many there are.
     """
 
     characters: str
@@ -35,8 +36,10 @@ class Split:
 
     Attributes
     ----------
-    word : its beginning, at most 80 characters. span : (start, end) in the source.
-    page : the page its first part is on. hyphenated : broken at a syllable, with a hyphen; else at the last cell.
+    word : its beginning, at most 80 characters.
+    span : (start, end) in the source.
+    page : the page its first part is on.
+    hyphenated : broken at a syllable, with a hyphen; else at the last cell.
     """
 
     word: str
@@ -53,7 +56,8 @@ class EncodingReport:
     ----------
     undefined : different characters the table cannot write, in order of their first use.
     undefined_total : how many such characters were met, all kinds together.
-    splits : breaks inside words. split_total : how many.
+    splits : breaks inside words.
+    split_total : how many.
     invisible : format characters without a sign of their own (soft hyphen, U+200B, direction marks) left out.
     pages, frames, cells : what was made; cells without blanks.
     """

@@ -22,8 +22,11 @@ class TableInfo:
     Attributes
     ----------
     file : name of the table file.
-    language : BCP 47 tag. grade : contraction grade. name : what to show to a person.
-    contraction : ``full``, ``partial`` or ``no``. dots : 6 or 8.
+    language : BCP 47 tag.
+    grade : contraction grade.
+    name : what to show to a person.
+    contraction : ``full``, ``partial`` or ``no``.
+    dots : 6 or 8.
     direction : ``forward`` when the table is not made for back-translation.
     """
 

@@ -109,7 +109,9 @@ class Transcriber:
 
     Parameters
     ----------
-    tables : as `resolve_tables` gives them. undefined : policy. dots : 6 leaves dots 7 and 8 out, 8 keeps them.
+    tables : as `resolve_tables` gives them.
+    undefined : policy.
+    dots : 6 leaves dots 7 and 8 out, 8 keeps them.
     """
 
     def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int) -> None:

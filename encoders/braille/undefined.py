@@ -54,7 +54,8 @@ def writable(chunk: str, base: int, alphabet: Alphabet, policy: Undefined, log: 
 
     Parameters
     ----------
-    chunk : source characters. base : position of the first in the source, for messages and the log.
+    chunk : source characters.
+    base : position of the first in the source, for messages and the log.
 
     Raises
     ------

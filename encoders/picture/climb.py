@@ -22,7 +22,8 @@ def climbed(parts: list[Quadratic], dots: Bools, ties: Floats) -> Bools:
 
     Parameters
     ----------
-    dots : bool, shape (n,). ties : float64, shape (n, groups), the dots that are flipped together.
+    dots : bool, shape (n,).
+    ties : float64, shape (n, groups), the dots that are flipped together.
     """
     small = [Quadratic(part.share, part.linear @ ties, ties.T @ part.matrix @ ties) for part in parts]
     state = (dots @ ties) >= 0.5 * ties.sum(axis=0)

@@ -38,7 +38,8 @@ class Step:
 
     Attributes
     ----------
-    name : what was done. image : float32, shape (height, width) or (height, width, 3), 0..1 linear.
+    name : what was done.
+    image : float32, shape (height, width) or (height, width, 3), 0..1 linear.
     """
 
     name: str

@@ -42,7 +42,8 @@ class Candidate:
 
     Attributes
     ----------
-    dots : bool, shape (rows, cols), read-only. similarity : with the figure in `window`, at most 1.
+    dots : bool, shape (rows, cols), read-only.
+    similarity : with the figure in `window`, at most 1.
     window : the part of the picture, in pixels of the figure.
     """
 
@@ -175,7 +176,8 @@ def best_patterns(figure: NDArray[np.float32], windows: list[Window], shape: Gri
 
     Parameters
     ----------
-    figure : float32, shape (height, width), 0..1. count : how many patterns are wanted.
+    figure : float32, shape (height, width), 0..1.
+    count : how many patterns are wanted.
 
     Returns
     -------

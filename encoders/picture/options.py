@@ -80,8 +80,10 @@ class PictureRule:
 
     Attributes
     ----------
-    type : of the value, None included where it stands for the default of the style. default : where nothing is said.
-    span : the numbers it may be, None where it is none. kind : the words it may be, None where it is none.
+    type : of the value, None included where it stands for the default of the style.
+    default : where nothing is said.
+    span : the numbers it may be, None where it is none.
+    kind : the words it may be, None where it is none.
     """
 
     type: Any
@@ -101,14 +103,19 @@ class PictureOptions:
 
     Attributes
     ----------
-    style : which defaults. background : ``auto`` (white or black, whichever shows more) or ``#rrggbb``.
-    crop : cut to what differs from the ground. fit : how the picture meets the grid.
-    contrast : even out the local brightness. edges : take outlines in place of areas.
+    style : which defaults.
+    background : ``auto`` (white or black, whichever shows more) or ``#rrggbb``.
+    crop : cut to what differs from the ground.
+    fit : how the picture meets the grid.
+    contrast : even out the local brightness.
+    edges : take outlines in place of areas.
     threshold : how figure and ground are parted; `threshold_value` is the linear luminance for ``fixed``.
-    invert : which side is raised. thicken : actuators by which strokes are widened on each side.
+    invert : which side is raised.
+    thicken : actuators by which strokes are widened on each side.
     gap_m, stroke_m : smallest empty space between parts, and smallest stroke, in metres; narrower ones are widened.
     pitch_m : distance of neighbouring rows and of neighbouring columns, in metres.
-    output : what a dot can be. levels : number of levels besides off, `level_step_db` (>= 3) apart.
+    output : what a dot can be.
+    levels : number of levels besides off, `level_step_db` (>= 3) apart.
     regions : number of textured regions, told apart by `regions_by`.
     zoom : 1, or n for an overview and then windows of 1/n of the picture, which overlap by `overlap` (0..0.9).
     dwell_s : seconds a frame is shown when the file does not say.

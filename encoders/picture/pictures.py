@@ -45,9 +45,11 @@ class FrameReport:
 
     Attributes
     ----------
-    view : ``overview``, or which part of the picture. steps : names of the steps taken, in order.
+    view : ``overview``, or which part of the picture.
+    steps : names of the steps taken, in order.
     similarity : of the frame's dots (or levels) with the figure, at most 1 (see `encoders.picture_similarity`).
-    candidates : good on/off patterns of the figure, best first. regions : of a texture, else empty.
+    candidates : good on/off patterns of the figure, best first.
+    regions : of a texture, else empty.
     figure : float64, shape (4 rows, 4 cols), read-only, 0..1: the figure as the best candidate's window cuts it out.
     """
 
@@ -65,8 +67,12 @@ class PictureReport:
 
     Attributes
     ----------
-    name : how it is called. kind : its format. size : (height, width) in pixels. style : the defaults used.
-    notes : what was left out while reading. frames : one for each frame of the scene.
+    name : how it is called.
+    kind : its format.
+    size : (height, width) in pixels.
+    style : the defaults used.
+    notes : what was left out while reading.
+    frames : one for each frame of the scene.
     """
 
     name: str
@@ -109,7 +115,8 @@ def encode_picture(
 
     Parameters
     ----------
-    source : path, bytes of a file, or Pillow image. limits : how much is read.
+    source : path, bytes of a file, or Pillow image.
+    limits : how much is read.
 
     Returns
     -------

@@ -55,7 +55,9 @@ class Picture:
 
     Attributes
     ----------
-    name : how it is called in messages. kind : its format. size : (height, width) in the file.
+    name : how it is called in messages.
+    kind : its format.
+    size : (height, width) in the file.
     frames : one, or those of an animation.
     notes : what was left out while reading, one clause each.
     """

@@ -34,8 +34,10 @@ class Texture:
     Attributes
     ----------
     kind : `SINE`, a wave of equal amplitude with a phase lag per actuator; or `BARS`, actuators on and off in turn.
-    lag_rad : phase lag per actuator (sine), 0 = all together. bar : actuators a bar is wide (bars).
-    direction : which way. level : amplitude, 0..1.
+    lag_rad : phase lag per actuator (sine), 0 = all together.
+    bar : actuators a bar is wide (bars).
+    direction : which way.
+    level : amplitude, 0..1.
     """
 
     kind: PatternKind
@@ -51,7 +53,9 @@ class Region:
 
     Attributes
     ----------
-    colour : linear red, green and blue, 0..1. dots : how many dots belong to it. texture : None for the ground.
+    colour : linear red, green and blue, 0..1.
+    dots : how many dots belong to it.
+    texture : None for the ground.
     """
 
     colour: tuple[float, float, float]

@@ -41,7 +41,9 @@ class Target:
 
     Attributes
     ----------
-    shape : the grid. figure : float64, shape (K, 4 rows, 4 cols), 0..1. weight : the same shape, sum 1 for each.
+    shape : the grid.
+    figure : float64, shape (K, 4 rows, 4 cols), 0..1.
+    weight : the same shape, sum 1 for each.
     flat : bool, shape (K,), filled or empty throughout, so that a correlation says nothing.
     centred : for each half of the measure the figure less its weighted mean, over its weighted standard
         deviation, times the weight; zero where the figure is flat.
@@ -66,7 +68,9 @@ class Quadratic:
 
     Attributes
     ----------
-    share : its part of the whole. linear : float64, shape (n,). matrix : float64, shape (n, n).
+    share : its part of the whole.
+    linear : float64, shape (n,).
+    matrix : float64, shape (n, n).
     """
 
     share: float
@@ -161,7 +165,8 @@ def similarities(figure: Floats, amplitudes: Floats) -> Floats:
 
     Parameters
     ----------
-    figure : float64, shape (4 rows, 4 cols), 0..1. amplitudes : float64, shape (A, rows, cols), 0..1.
+    figure : float64, shape (4 rows, 4 cols), 0..1.
+    amplitudes : float64, shape (A, rows, cols), 0..1.
     """
     target = target_of(figure[None], GridShape(*amplitudes.shape[1:]))
     found: Floats = agreement(target, amplitudes)[0]

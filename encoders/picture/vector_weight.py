@@ -22,8 +22,9 @@ class Weight:
 
     Attributes
     ----------
-    elements : how many. squares : of the number of points of each path, added up; the time that a path takes grows
-        with its square. What else takes time counts as so many squares.
+    elements : how many.
+    squares : of the number of points of each path, added up; the time that a path takes grows with its square. What
+        else takes time counts as so many squares.
     """
 
     elements: int = 0

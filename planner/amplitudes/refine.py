@@ -32,7 +32,8 @@ class Refined:
     Attributes
     ----------
     epsilon : complex128, shape (P,), drive phasors that make the last actuator's phasor real and positive.
-    lam : float64, shape (P, n-1). phasor : complex128, shape (P, n), from harmonic balance.
+    lam : float64, shape (P, n-1).
+    phasor : complex128, shape (P, n), from harmonic balance.
     error : float64, shape (P,), worst deviation of an amplitude plus the solver's own error estimate.
     outcome : object, shape (P,).
     """

@@ -35,7 +35,8 @@ class Linearisation:
 
     Attributes
     ----------
-    chain : what was built. point : what it is driven at, and its motion.
+    chain : what was built.
+    point : what it is driven at, and its motion.
     """
 
     chain: Chain

@@ -37,12 +37,13 @@ class ParetoPoint:
 
     Attributes
     ----------
-    omega : drive frequency over f0, 0 for deflections. ramp_s : length of the way in.
+    omega : drive frequency over f0, 0 for deflections.
+    ramp_s : length of the way in.
     contrast_db : of raised and unraised dots; infinite where unraised ones rest.
     error : worst deviation from the wish after the way in, unraised dots included, in units of full scale.
     made : the same from what the settings were made for, with the unraised dots at their level.
-    drive : peak of the drive or of any bias, on the way and after it, over the amplifier's. noise_gain : as in
-        `Margins`.
+    drive : peak of the drive or of any bias, on the way and after it, over the amplifier's.
+    noise_gain : as in `Margins`.
     spread : deviation that 1 % spread (1 sigma) of the natural frequencies makes at the worst actuator, full scale.
     """
 

@@ -54,7 +54,8 @@ class Question:
 
     Attributes
     ----------
-    setting : P settings. planned : complex128, shape (P, n), the first harmonics the plan predicts, or deflections.
+    setting : P settings.
+    planned : complex128, shape (P, n), the first harmonics the plan predicts, or deflections.
     """
 
     chain: Chain

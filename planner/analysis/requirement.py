@@ -37,7 +37,8 @@ class Term:
     Attributes
     ----------
     effect : how far the pattern would be off without it, at most, relative to the frame's largest amplitude.
-    included : whether it has to be modelled. why : one sentence.
+    included : whether it has to be modelled.
+    why : one sentence.
     cost : evaluations of one oscillator's equation that it adds to a linear model, alone.
     """
 
@@ -54,8 +55,10 @@ class Requirement:
 
     Attributes
     ----------
-    tol : what everything left out may amount to together, relative. terms : in the order of `TERMS`.
-    left_out : how much everything left out could matter together, at most. moving : whether anything vibrates.
+    tol : what everything left out may amount to together, relative.
+    terms : in the order of `TERMS`.
+    left_out : how much everything left out could matter together, at most.
+    moving : whether anything vibrates.
     work, work_of_all : evaluations of one oscillator's equation, with what is included and with everything.
     """
 
@@ -121,7 +124,8 @@ def require(frames: Iterable[FramePlan], device: Device, around: Surroundings, *
 
     Parameters
     ----------
-    frames : as in `Plan.frames`. around : what acts beside the profile; `assumed` has values.
+    frames : as in `Plan.frames`.
+    around : what acts beside the profile; `assumed` has values.
     tol : relative to each frame's largest amplitude.
 
     Raises

@@ -48,7 +48,9 @@ class SceneEffects:
     Attributes
     ----------
     effects : term -> how far the pattern would be off without it, relative to the frame's largest amplitude.
-    frames : how many. ramp_share : largest part of a frame that its way in takes. end_s : length of the scene.
+    frames : how many.
+    ramp_share : largest part of a frame that its way in takes.
+    end_s : length of the scene.
     """
 
     device: Device

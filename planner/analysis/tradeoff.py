@@ -49,8 +49,9 @@ class TradeoffRow:
     tol : what it was asked for; None where the rung gives what it has.
     error, estimate : worst distance from the reference, and what the rung itself says, relative to each chain's
         largest amplitude, over the chains it has the planned motion of.
-    seconds : best of a few runs, warm. memory : largest bytes in use; None where a run is long, since watching takes
-        several times as long. work : of one run.
+    seconds : best of a few runs, warm.
+    memory : largest bytes in use; None where a run is long, since watching takes several times as long.
+    work : of one run.
     solved : share of the chains it has the planned motion of.
     """
 
@@ -88,9 +89,12 @@ class Tradeoff:
 
     Attributes
     ----------
-    states : distinct chains compared. reference : what `error` is measured from, in words.
+    states : distinct chains compared.
+    reference : what `error` is measured from, in words.
     reference_error : to what that is known itself; smaller errors say no more than that.
-    rows : cheapest rungs first. refused : rung -> why it cannot answer. skipped : chains that no rung compares.
+    rows : cheapest rungs first.
+    refused : rung -> why it cannot answer.
+    skipped : chains that no rung compares.
     """
 
     device: str

@@ -32,7 +32,8 @@ def nearest_geometric(device: Device, target: Floats, most: float) -> Geometric:
 
     Parameters
     ----------
-    target : float64, shape (n,). most : the largest amplitude allowed, in the same unit.
+    target : float64, shape (n,).
+    most : the largest amplitude allowed, in the same unit.
     """
     steepest = device.coupling.lam.max / (device.delta * device.omega.min)
     if device.coupling.closure is Closure.RING:

@@ -39,7 +39,8 @@ class MotionTarget:
 
     Attributes
     ----------
-    phasor : complex128, shape (n,), dimensionless. phased : bool, shape (n,), where its phase is part of the wish.
+    phasor : complex128, shape (n,), dimensionless.
+    phased : bool, shape (n,), where its phase is part of the wish.
     weight : float64, shape (n,), 0 = don't care.
     """
 

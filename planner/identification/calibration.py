@@ -59,7 +59,8 @@ class Sweep:
 
     Attributes
     ----------
-    omega : float64, shape (S,), drive frequency over the device's f0. volts : float64, shape (S,), drive amplitude.
+    omega : float64, shape (S,), drive frequency over the device's f0.
+    volts : float64, shape (S,), drive amplitude.
     phasor : complex128, shape (S, n), z = Re(phasor e^{i omega tau}) under volts cos(omega tau), dimensionless; NaN
         where nothing was measured. Up and down sweeps may differ at one setting: the branch is taken from here.
     """
@@ -75,7 +76,8 @@ class ChainFit:
 
     Attributes
     ----------
-    natural : float64, shape (n,), natural frequency over the device's f0. delta, beta : float64, shape (n,).
+    natural : float64, shape (n,), natural frequency over the device's f0.
+    delta, beta : float64, shape (n,).
     feed : float64, shape (n,); the first is the drive's epsilon per volt, the others are lam.
     error : float64, shape (4, n), standard errors of natural, delta, beta and feed.
     covariance : float64, shape (4n, 4n), actuator by actuator.

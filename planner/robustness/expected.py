@@ -50,7 +50,9 @@ def expected_of(device: Device, amplitude: Floats, epsilon: Floats, lam: Floats,
 
     Parameters
     ----------
-    amplitude : float64, shape (P, n), wished, dimensionless. epsilon : (P,). lam : (P, n-1).
+    amplitude : float64, shape (P, n), wished, dimensionless.
+    epsilon : (P,).
+    lam : (P, n-1).
     """
     parts = draw(device.chain_length, count=FEW, seed=SEED).parts(device.chain, known_spread(device))
     wishes = [

@@ -29,9 +29,10 @@ def march_ring(
 
     Parameters
     ----------
-    parts : the rings; centre : those they are drawn around, which broadcast against them.
-    force, lam, omega : as in `march`; the first lam closes the ring. near : complex128, shape (n, ...), the motion of
-        `centre` under them. `BatchMotion.tangent` of the answer is NaN.
+    parts : the rings;
+    centre : those they are drawn around, which broadcast against them.
+    force, lam, omega : as in `march`; the first lam closes the ring.
+    near : complex128, shape (n, ...), the motion of `centre` under them. `BatchMotion.tangent` of the answer is NaN.
     """
     size = np.broadcast_shapes(parts.stiffness.shape, force.shape, np.shape(omega))
     phasor = np.array(np.broadcast_to(near, size), dtype=np.complex128)

@@ -42,7 +42,8 @@ class RobustPlan:
 
     Attributes
     ----------
-    nominal : the setting that was given. robust : the one with the least expected error the device can hold.
+    nominal : the setting that was given.
+    robust : the one with the least expected error the device can hold.
     trade : for ever higher frequencies the robust setting at each; empty where only the given one has a closed form.
     """
 
@@ -94,7 +95,8 @@ def robust_plan(device: Device, trial: Trial, nominal: OperatingPoint, *, well_s
 
     Parameters
     ----------
-    nominal : a setting for the pattern, such as the plan's. well_share : largest amplitude over the hilltop's.
+    nominal : a setting for the pattern, such as the plan's.
+    well_share : largest amplitude over the hilltop's.
 
     Raises
     ------

@@ -34,8 +34,9 @@ def aim_for(device: Device, target: Floats, omega: float, chains: int) -> Floats
 
     Parameters
     ----------
-    device : with a spread, whose chains are alike (`Device.alone`). target : float64, shape (n,), > 0, full scale,
-        for which `links_for` has an answer. chains : how many a frame has, each with its own actuators.
+    device : with a spread, whose chains are alike (`Device.alone`).
+    target : float64, shape (n,), > 0, full scale, for which `links_for` has an answer.
+    chains : how many a frame has, each with its own actuators.
 
     Returns
     -------

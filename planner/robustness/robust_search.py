@@ -37,10 +37,13 @@ class Trial:
 
     Attributes
     ----------
-    chain : the nominal chain: the device's, or what was measured of it. wish : of this chain.
+    chain : the nominal chain: the device's, or what was measured of it.
+    wish : of this chain.
     spread : how actuators differ from the nominal ones.
-    tolerance : largest error that counts as made; threshold : level that parts dots from no dots; units of full scale.
-    count : draws that settings are judged by; they are not those that settings are fitted to. seed : of all draws.
+    tolerance : largest error that counts as made;
+    threshold : level that parts dots from no dots; units of full scale.
+    count : draws that settings are judged by; they are not those that settings are fitted to.
+    seed : of all draws.
     """
 
     chain: Chain
@@ -58,9 +61,11 @@ class TradeRow:
 
     Attributes
     ----------
-    point : the setting. volts : its drive over the amplifier's.
-    phasor : complex128, shape (n,), its motion without spread, dimensionless; well : largest of it over the hilltop's;
-        nominal_error : its error in units of full scale.
+    point : the setting.
+    volts : its drive over the amplifier's.
+    phasor : complex128, shape (n,), its motion without spread, dimensionless;
+    well : largest of it over the hilltop's;
+    nominal_error : its error in units of full scale.
     report : under spread.
     """
 

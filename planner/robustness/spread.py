@@ -332,8 +332,8 @@ def spread_of(
     Parameters
     ----------
     states : what each chain holds, as in `FramePlan.states`; their `target` and `phase` are what is wanted.
-    tolerance : largest error that counts as made, in units of full scale. threshold : the level that parts dots from
-        no dots, in the same units.
+    tolerance : largest error that counts as made, in units of full scale.
+    threshold : the level that parts dots from no dots, in the same units.
 
     Raises
     ------

@@ -34,7 +34,8 @@ class Blended:
     Attributes
     ----------
     drive : float64, shape (P, nodes, 4), real and imaginary part of the envelope, then of its derivative in tau.
-    lam, slope : float64, shape (P, nodes, n-1). possible : bool, shape (P,); where False the rest means nothing.
+    lam, slope : float64, shape (P, nodes, n-1).
+    possible : bool, shape (P,); where False the rest means nothing.
     """
 
     drive: Floats

@@ -29,8 +29,10 @@ class Way:
 
     Attributes
     ----------
-    tau : float64, shape (K,). epsilon, epsilon_slope : complex128, shape (K,), slope in tau.
-    lam_tau : float64, shape (L,). lam : float64, shape (L, n-1).
+    tau : float64, shape (K,).
+    epsilon, epsilon_slope : complex128, shape (K,), slope in tau.
+    lam_tau : float64, shape (L,).
+    lam : float64, shape (L, n-1).
     """
 
     tau: Floats
@@ -69,7 +71,9 @@ class Orbit:
 
     Attributes
     ----------
-    harmonics : complex128, shape (H, n). lam : float64, shape (n-1,), the links it stands under. omega : over f0.
+    harmonics : complex128, shape (H, n).
+    lam : float64, shape (n-1,), the links it stands under.
+    omega : over f0.
     """
 
     harmonics: Complexes

@@ -34,9 +34,11 @@ class WayLimits:
 
     Attributes
     ----------
-    epsilon_max : largest dimensionless drive. slew_per_s : its fastest change, carrier included, per second.
-    lam_min, lam_max : range of the links. lam_scope : whether links may move on the way, and whether one by one
-        (`link`) or all alike (`chain`); `fixed` keeps them at their steady values.
+    epsilon_max : largest dimensionless drive.
+    slew_per_s : its fastest change, carrier included, per second.
+    lam_min, lam_max : range of the links.
+    lam_scope : whether links may move on the way, and whether one by one (`link`) or all alike (`chain`); `fixed` keeps
+        them at their steady values.
     well_share : largest part of the hilltop amplitude sqrt(1/|beta|) that may be passed through (beta < 0).
 
     Raises

@@ -35,7 +35,8 @@ def rested(device: Device, before: OperatingPoint, after: OperatingPoint, way: C
 
     Parameters
     ----------
-    before, after : motions of one tone in an open chain. way : the whole way for a rest of so many seconds.
+    before, after : motions of one tone in an open chain.
+    way : the whole way for a rest of so many seconds.
     """
     tried: list[tuple[float, Ramp]] = []
     for rest in RESTS:

@@ -40,7 +40,9 @@ def find_way(
     Parameters
     ----------
     chain : open, of equal actuators over resistors.
-    epsilon : steady drive phasor. lam : float64, shape (n-1,). phasor : complex128, shape (n,), the motion they hold.
+    epsilon : steady drive phasor.
+    lam : float64, shape (n-1,).
+    phasor : complex128, shape (n,), the motion they hold.
     tau_per_s : of the device.
     budget : how many slopes (sensitivities of a whole way, 10..50 ms each) may be taken; 60 are plenty where the links
         may move.

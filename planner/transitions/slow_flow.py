@@ -46,7 +46,8 @@ def follow_course(
 
     Parameters
     ----------
-    duration : in tau. start : complex128, shape (n,), amplitudes to begin with.
+    duration : in tau.
+    start : complex128, shape (n,), amplitudes to begin with.
     softness : at 1 the stiffness is the chain's, at 0 what is lent instead: the flow is then linear and, if what is
         lent is its amplitude there, stands at the same end.
 

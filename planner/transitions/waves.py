@@ -27,8 +27,8 @@ def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: fl
 
     Parameters
     ----------
-    moves : where lam may differ on the way from what it is in the end. tolerance : of what is waited for where no quick
-        way is found, relative to the largest amplitude.
+    moves : where lam may differ on the way from what it is in the end.
+    tolerance : of what is waited for where no quick way is found, relative to the largest amplitude.
     """
     lacking = ""
     if device.coupling.closure is Closure.OPEN:

@@ -39,9 +39,11 @@ class TwoToneWave:
 
     Attributes
     ----------
-    lam : of every link. omega : float64, shape (6,), of the tones k = -2..3, over f0.
+    lam : of every link.
+    omega : float64, shape (6,), of the tones k = -2..3, over f0.
     lag : float64, shape (6,), of each tone from actuator to actuator, radians.
-    epsilon : complex128, shape (6,), drive phasors. phasor : complex128, shape (6,), of the first actuator.
+    epsilon : complex128, shape (6,), drive phasors.
+    phasor : complex128, shape (6,), of the first actuator.
     """
 
     lam: float
@@ -66,7 +68,8 @@ def apart(chain: Chain, *, amplitude: float, width: float, spacing: float) -> Tw
 
     Parameters
     ----------
-    width : of a bar in actuators. spacing : of the tones, over f0; they lie on both sides of resonance.
+    width : of a bar in actuators.
+    spacing : of the tones, over f0; they lie on both sides of resonance.
     """
     step = math.pi / width
     middle = math.sqrt(max(1 + 2.25 * chain.beta * amplitude**2, 0.1)) - spacing / 2

@@ -25,7 +25,8 @@ def wave_for(chain: Chain, *, amplitude: float, lag: float, ratio: float = 1.0) 
 
     Parameters
     ----------
-    lag : radians, in (0, pi). ratio : > 0.
+    lag : radians, in (0, pi).
+    ratio : > 0.
     """
     steps = np.arange(chain.n)
     bend = 0.75 * chain.beta * amplitude**2

@@ -19,9 +19,11 @@ class Reader:
 
     Attributes
     ----------
-    name : as a person is told to give it. suffixes : endings of its files, in lower case.
+    name : as a person is told to give it.
+    suffixes : endings of its files, in lower case.
     place : ``module:function`` of the one that turns a file's bytes into characters, cells for Braille, or raises
-    InvalidText with a place; loaded when a file is read. begins : first bytes its files are known by, if any.
+        InvalidText with a place; loaded when a file is read.
+    begins : first bytes its files are known by, if any.
     """
 
     name: str
