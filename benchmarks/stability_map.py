@@ -26,7 +26,7 @@ CELL, LEFT, TOP = 22, 330, 150
 
 
 def hostile_list():
-    path = ROOT / "tests" / "test_chainsim_hostile.py"
+    path = ROOT / "tests" / "chainsim" / "test_hostile.py"
     spec = importlib.util.spec_from_file_location("hostile", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -37,7 +37,7 @@ QUIET = 0.1  # Change of every oscillator between two looks, relative, above whi
 NEAR = 0.05  # Distance of every oscillator from its answer, relative, at which the linearised flow decides.
 SAME = 0.02  # Two answers nearer than this, relative, are one.
 # What the slow flow leaves out, relative: at least the first, the second times (beta a^2)^2, and the third times
-# (3 beta z0 a)^2 beside an equilibrium z0. Measured against the full equations (tests/test_chainsim_starts.py).
+# (3 beta z0 a)^2 beside an equilibrium z0. Measured against the full equations (tests/chainsim/test_starts.py).
 ERROR = (3e-4, 0.1, 0.5)
 FEW = 32  # Settings up to which
 MOST_STEPS = (256, 32)  # steps between two looks may be as many as the first, else as the second: a motion that needs

@@ -1,0 +1,110 @@
+"""Several living writers of the same files: what is there belongs together, and is of the last one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from drivers import atomic_files, settled
+from drivers.files.parts import part_of
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks on folders")
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMES = ("x.wav", "x.json")
+ROUNDS = 300
+# Writes its own word into both files whenever it is told to. After every new name the other one gets its turn.
+WRITER = """
+import os, sys
+from pathlib import Path
+from drivers import atomic_files
+folder, word = Path(sys.argv[1]), sys.argv[2].encode()
+renamed = os.replace
+def replace(*names):
+    renamed(*names)
+    for _ in range(200):
+        os.sched_yield()
+os.replace = replace
+for line in sys.stdin:
+    with atomic_files(folder / "x.wav", folder / "x.json") as files:
+        for file in files:
+            file.write(word + line.encode())
+    print("done", flush=True)
+"""
+# Dies when it has given `argv[2]` new names.
+DYING = """
+import os, sys
+from pathlib import Path
+from drivers import atomic_files
+renamed, left = os.replace, [int(sys.argv[2])]
+def replace(*names):
+    renamed(*names)
+    left[0] -= 1
+    if not left[0]:
+        os._exit(9)
+os.replace = replace
+with atomic_files(Path(sys.argv[1]) / "x.wav", Path(sys.argv[1]) / "x.json") as files:
+    for file in files:
+        file.write(b"of the dead")
+"""
+
+
+def words(folder: Path) -> set[bytes]:
+    return {(folder / name).read_bytes() for name in NAMES}
+
+
+def test_two_writers_at_once_leave_the_files_of_one(tmp_path: Path) -> None:
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(tmp_path), word], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True,
+        )
+        for word in ("one", "other")
+    ]  # fmt: skip
+    seen = set()
+    for number in range(ROUNDS):
+        for writer in writers:
+            writer.stdin.write(f" {number}\n")
+            writer.stdin.flush()
+        assert [writer.stdout.readline() for writer in writers] == ["done\n"] * 2
+        assert len(words(tmp_path)) == 1
+        seen |= words(tmp_path)
+    for writer in writers:
+        writer.communicate()
+        assert writer.returncode == 0
+    assert len(seen) == ROUNDS
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("names_given", [1, 2, 3])
+def test_one_that_died_in_between_comes_before_who_ends_later(names_given: int, tmp_path: Path) -> None:
+    with atomic_files(*(tmp_path / name for name in NAMES)) as files:
+        for file in files:
+            file.write(b"of the living")
+        dead = subprocess.run(
+            [sys.executable, "-c", DYING, str(tmp_path), str(names_given)],
+            env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False,
+        )  # fmt: skip
+        assert dead.returncode == 9
+    settled(tmp_path / "x.json", NAMES.__contains__)
+    assert words(tmp_path) == {b"of the living"}
+    assert not [path for path in tmp_path.iterdir() if part_of(path)]
+
+
+def test_a_folder_that_somebody_holds_is_written_to_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import fcntl
+
+    monkeypatch.setattr("drivers.locks.PATIENCE_S", 0.0)
+    number = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(number, fcntl.LOCK_EX)
+    with atomic_files(*(tmp_path / name for name in NAMES)) as files:
+        for file in files:
+            file.write(b"all the same")
+    os.close(number)
+    assert words(tmp_path) == {b"all the same"}
