@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..plain import one_line
-from .html import html_facts
 from .printable import Printable
 from .totals import Spreading
 
@@ -80,6 +79,8 @@ class Report(ABC):
         return f"<{type(self).__name__} on {self.device}: {counts or 'no frame'}, {self.duration_s:.2f} s>"
 
     def _repr_html_(self) -> str:
+        from .html import html_facts
+
         return html_facts(f"What was rendered for {self.device}", self.as_dict())
 
     def as_dict(self) -> dict[str, Any]:

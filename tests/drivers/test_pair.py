@@ -196,7 +196,8 @@ def test_no_frames_make_an_empty_waveform(tmp_path: Path) -> None:
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.text(max_size=20) | st.text(st.characters(categories=["Cs", "Cc", "Lo"]), max_size=5), st.floats(0, 1e3))
+# Half a surrogate pair is in no frame: sources refuse it.
+@given(st.text(max_size=20) | st.text(st.characters(categories=["Cc", "Lo"]), max_size=5), st.floats(0, 1e3))
 def test_any_text_and_number_survives_the_manifest(
     tmp_path_factory: pytest.TempPathFactory, text: str, number: float
 ) -> None:

@@ -100,7 +100,7 @@ def test_a_folder_that_somebody_holds_is_written_to_all_the_same(
 ) -> None:
     import fcntl
 
-    monkeypatch.setattr("drivers.locks.PATIENCE_S", 0.0)
+    monkeypatch.setattr("drivers.files.locks.PATIENCE_S", 0.0)
     number = os.open(tmp_path, os.O_RDONLY)
     fcntl.flock(number, fcntl.LOCK_EX)
     with atomic_files(*(tmp_path / name for name in NAMES)) as files:

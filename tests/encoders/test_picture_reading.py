@@ -211,6 +211,6 @@ def test_the_errors_are_value_errors_of_the_encoders() -> None:
 
 
 def test_importing_pictures_imports_no_library() -> None:
-    code = "import sys, encoders.pictures; print(sorted({'PIL', 'resvg_py', 'scipy'} & set(sys.modules)))"
+    code = "import sys, encoders.picture.pictures; print(sorted({'PIL', 'resvg_py', 'scipy'} & set(sys.modules)))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

@@ -154,7 +154,7 @@ def test_what_is_too_long_is_not_taken_into_memory(pair: Path, dotwave) -> None:
 
 def test_no_manifest_is_written_that_is_not_read_again(pair: Path, dotwave, monkeypatch: pytest.MonkeyPatch) -> None:
     before = pair.read_bytes()
-    monkeypatch.setattr(drivers.waveform.manifest, "REST_BYTES", drivers.manifest.MOST_BYTES - 1000)
+    monkeypatch.setattr(drivers.waveform.manifest, "REST_BYTES", drivers.waveform.manifest.MOST_BYTES - 1000)
     ended = dotwave("text", "two words, and more", "-d", "independent-6x6", "-o", pair)
     assert ended.code == 2
     assert "give less at a time" in ended.err

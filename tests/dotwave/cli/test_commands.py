@@ -146,6 +146,7 @@ def test_a_signal_ends_the_command_and_cleans_up(tmp_path: Path, number: int) ->
     partial = tmp_path / "partial"
     code = f"""
 import signal, sys, types
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell in the background had ignored
 from pathlib import Path
 from dotwave.cli.app import main
 def verify(path):

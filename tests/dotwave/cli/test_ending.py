@@ -23,9 +23,9 @@ def failing(dotwave, monkeypatch: pytest.MonkeyPatch):
         def fail(path: Path) -> None:
             raise error
 
-        fake = ModuleType("dotwave.verification")
+        fake = ModuleType("dotwave.api.felt")
         fake.verify = fail
-        monkeypatch.setitem(sys.modules, "dotwave.verification", fake)
+        monkeypatch.setitem(sys.modules, "dotwave.api.felt", fake)
         return dotwave("verify", "x.wav")
 
     return end
@@ -63,7 +63,7 @@ def test_a_fault_of_the_program_says_how_to_report_it(failing) -> None:
     assert (ended.code, ended.out) == (70, "")
     assert ended.err.count("\n") == 1
     assert "\x1b" not in ended.err
-    for part in (metadata.version("dotwave"), "ZeroDivisionError: division by zero", "test_cli_ending.py:", "report"):
+    for part in (metadata.version("dotwave"), "ZeroDivisionError: division by zero", "test_ending.py:", "report"):
         assert part in ended.err
     assert "DOTWAVE_DEBUG=1" in ended.err
     assert "Traceback" not in ended.err

@@ -149,7 +149,7 @@ ORPHANS = """
 import sys
 from dotwave.icon_sets.pool import LocalPool
 from dotwave.icon_sets.work import Task
-from tests.test_icons_workers import announce
+from tests.dotwave.icon_sets.test_workers import announce
 if __name__ == "__main__":
     with LocalPool(2, 1e6) as pool:
         list(pool.run(announce, sys.argv[1], [Task(sys.argv[2]), Task(sys.argv[2])], 1))
@@ -193,7 +193,7 @@ def late(place: str) -> None:
 LATE = """
 import multiprocessing, os, sys
 from pathlib import Path
-from tests.test_icons_workers import late
+from tests.dotwave.icon_sets.test_workers import late
 if __name__ == "__main__":
     Path(sys.argv[1], "..", "parent").write_text(str(os.getpid()))
     multiprocessing.get_context("spawn").Process(target=late, args=(sys.argv[1],)).start()
