@@ -154,7 +154,7 @@ def _back_check(frames: TextFrames) -> tuple[tuple[str, ...], str]:
     if len(frames.source.text) > MOST_CHECKED:
         return (), f"A text of more than {MOST_CHECKED} characters is not translated back here; verify does it."
     check = frames.check()
-    return tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences), check.sentence
+    return tuple(one.sentence for one in (*check.differences, *check.alone)), check.sentence
 
 
 def _notes(device: Device, encoded: EncodingReport, watch: _Watch) -> Iterator[str]:

@@ -10,20 +10,21 @@ from functools import lru_cache
 from ..errors import TableMissing
 from . import louis_binding
 from .alphabet import alphabet
+from .cuts import Cutter, continuation_sign
 from .dots import BLANK, HIGHEST_6_DOT, LOWER_SIX
-from .layout import PlacedWord
+from .layout import Cut, PlacedWord, cut_anywhere
 from .readers.sources import SourceKind, TextSource
 from .report import ReportLog
 from .tables import hyphenation_tables
-from .undefined import ZERO_WIDTH_JOINER, Undefined, extends, writable
+from .undefined import ZERO_WIDTH_JOINER, Undefined, Writable, extends, writable
 
 __all__ = ["PARAGRAPH_END", "Transcriber", "Translation", "translate"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
-LONGEST_HYPHENATED = 100
 PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
+_WORD = re.compile(r"\S+")
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
@@ -109,12 +110,14 @@ class Transcriber:
     Parameters
     ----------
     tables : as `resolve_tables` gives them. undefined : policy. dots : 6 leaves dots 7 and 8 out, 8 keeps them.
+    passages : whether capitals of several words may be marked once for all; without, each page can be read alone.
     """
 
-    def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int) -> None:
+    def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int, passages: bool = True) -> None:
         self.tables = tables
         self.undefined = undefined
         self.dots = dots
+        self.passages = passages
 
     def paragraphs(self, source: TextSource) -> Iterator[tuple[int, int]]:
         """(start, end) of each paragraph: parted by an empty line or a form feed."""
@@ -131,32 +134,46 @@ class Transcriber:
         text = source.text
         held: PlacedWord | None = None
         for base, stop, glued in _pieces(text, start, end):
-            cells, origin = self._piece(source, base, stop, log)
+            cells, origin, ready = self._piece(source, base, stop, log)
             at = 0
             for word in cells.split(BLANK):
                 if word:
-                    first = base + origin[at]
+                    here, after = (
+                        origin[at],
+                        origin[at + len(word)] if at + len(word) < len(origin) else len(ready.text),
+                    )
+                    first = base + (here if ready.origins is None else ready.origins[here])
                     if held is not None:
                         yield held._replace(end=_end(text, held.start, first))
-                    held = PlacedWord(word, first, first, origin, at, base, glued and at == 0 and held is not None)
+                    said = ready.text[here : max(after, here + 1)].rstrip()
+                    joined = glued and at == 0 and held is not None
+                    held = PlacedWord(word, said, first, first, ready.origins, here, base, joined)
                 at += len(word) + 1
         if held is not None:
             yield held._replace(end=_end(text, held.start, end))
 
-    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int]]:
+    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int], Writable]:
         chunk = source.text[start:stop]
         if source.kind is SourceKind.BRAILLE:
+            ready = Writable(chunk, None)
             cells, origin = _SPACE.sub(BLANK, chunk), list(range(len(chunk)))
         else:
             ready = writable(chunk, start, alphabet(self.tables), self.undefined, log)
-            cells, origin, _ = _translated(self.tables, ready.text)
-            if ready.origins is not None:
-                origin = [ready.origins[position] for position in origin]
+            cells, origin = self._written(ready.text)
         if self.dots == 6 and max(cells, default="") > HIGHEST_6_DOT:
             for at, cell in enumerate(cells):
                 if cell > HIGHEST_6_DOT:
-                    log.undefined(chunk[origin[at]], "six dots", cell.translate(LOWER_SIX), start + origin[at])
+                    place = origin[at] if ready.origins is None else ready.origins[origin[at]]
+                    log.undefined(chunk[place], "six dots", cell.translate(LOWER_SIX), start + place)
             cells = cells.translate(LOWER_SIX)
+        return cells, origin, ready
+
+    def _written(self, text: str) -> tuple[str, list[int]]:
+        cells, origin = "", list[int]()
+        for start, stop in [(0, len(text))] if self.passages else _apart(text):
+            some, back, _ = _translated(self.tables, text[start:stop])
+            cells += some
+            origin += [start + position for position in back] if start else back
         return cells, origin
 
     def hyphen(self) -> str:
@@ -165,21 +182,52 @@ class Transcriber:
             return ""
         return louis_binding.translate_string(self.tables, "-", undefined=True).translate(LOWER_SIX)
 
-    def breaks(self, source: TextSource, word: PlacedWord) -> list[int]:
-        """Cells of `word` before which it may be hyphenated; none inside a contraction."""
-        together = hyphenation_tables(self.tables)
-        text = source.text[word.start : word.end]
-        if not together or len(text) > LONGEST_HYPHENATED:
-            return []
-        first_cell: dict[int, int] = {}
-        for cell in range(len(word.cells)):
-            first_cell.setdefault(word.base + word.origin[word.at + cell] - word.start, cell)
-        return [first_cell[at] for at in _points(together, text) if first_cell.get(at, 0) > 0]
+    def continuation(self) -> str:
+        """The sign the code has for words that go on and are not of letters, empty when it has none."""
+        return continuation_sign(self.tables)
+
+    def cut(self, word: PlacedWord, room: int, hyphen: str, continuation: str) -> Cut:
+        """Where a word of text is cut that has more cells than `room`; see `encoders.braille.cuts`."""
+        if not word.text:
+            return cut_anywhere(word, room)
+        return _cutter(self.tables, self.dots, hyphen, continuation).cut(word.text, word.cells, room, word.lettered)
+
+
+@lru_cache(maxsize=16)
+def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) -> Cutter:
+    together = hyphenation_tables(tables) if hyphen else ()
+
+    @lru_cache(maxsize=1 << 14)
+    def write(text: str) -> str:
+        cells, _, _ = _translated(tables, text)
+        return cells.translate(LOWER_SIX) if dots == 6 else cells
+
+    @lru_cache(maxsize=1 << 12)
+    def read(cells: str) -> str:
+        try:
+            return louis_binding.back_translate(tables, cells)
+        except RuntimeError:
+            return "\0"  # two parts then never read as the whole
+
+    return Cutter(write, read, lambda word: _points(together, word) if together else [], hyphen, continuation)
 
 
 @lru_cache(maxsize=4096)
 def _points(tables: tuple[str, ...], word: str) -> list[int]:
     return louis_binding.hyphenate(tables, word)
+
+
+def _apart(text: str) -> Iterator[tuple[int, int]]:
+    """(start, end) of parts, so that no two words of capitals are in one."""
+    start, before = 0, False
+    if any(one.isupper() for one in text.split()):
+        for match in _WORD.finditer(text):
+            capitals = match[0].isupper()
+            if capitals and before:
+                yield start, match.start()
+                start = match.start()
+            before = capitals
+    yield start, len(text)
 
 
 def _end(text: str, start: int, following: int) -> int:
