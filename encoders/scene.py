@@ -73,13 +73,17 @@ class GoesOn:
     Attributes
     ----------
     run : number of the run on the page, from 0.
-    mark : cells that end the run and say that the word goes on; empty when there are none.
-    restated : cells that begin the next run, its indicators once more; empty when it needs none.
+    mark : cells that end the run and say that the word goes on, such as a hyphen.
+    restated : cells at the start of the next run that the word has not there: its indicators once more.
+    ending : cells before the mark that the word has not there, as it is written at the end of a word.
+    left_out : cells of the word that stand in neither run, such as a contraction over the place.
     """
 
     run: int
-    mark: str
-    restated: str
+    mark: str = ""
+    restated: str = ""
+    ending: str = ""
+    left_out: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from encoders import GoesOn, GridShape, LayoutError, join_pages
+from encoders.braille.joining import unmarked
 from encoders.braille.layout import NARROW, Cut, Layout, PlacedWord, cut_anywhere, paginate
 
 # Blank-free cells with many hyphens, the one cell that is special.
@@ -28,7 +29,8 @@ def every_other(layout: Layout):
         most = room - len(layout.hyphen)
         again = word.cells[0] if layout.run >= 4 else ""
         at = most // 2 * 2 if most >= 2 + len(again) else most
-        return Cut(max(0, len(word.text) - len(word.cells) + at), at, layout.hyphen, again, True)
+        first = word.cells[:at] + layout.hyphen
+        return Cut(max(0, len(word.text) - len(word.cells) + at), at, first, layout.hyphen, again)
 
     return cut
 
@@ -106,27 +108,26 @@ def test_a_word_keeps_to_its_line_when_it_fits_one():
 
 
 def test_what_was_added_at_a_cut_is_noted_and_taken_out_again():
-    layout = Layout(GridShape(6, 6), 3, hyphen="⠤")
-    notes: list[Cut] = []
-    pages = list(
-        paginate(
-            words_of(["⠼" + "⠃" * 7]), layout, lambda *_: Cut(4, 4, "⠤", "⠼", True), lambda _, cut: notes.append(cut)
-        )
-    )
-    assert [page.cells for page in pages] == ["⠼⠃⠃⠃⠤⠀", "⠼⠃⠃⠃⠃⠀"]
-    assert [page.goes_on for page in pages] == [(GoesOn(0, "⠤", "⠼"),), ()]
-    assert [cut.hyphenated for cut in notes] == [True]
-    encoding = {"run": 6, "hyphen": "⠤"}
+    layout, encoding = Layout(GridShape(6, 6), 3, hyphen="⠤"), {"run": 6, "hyphen": "⠤"}
+    seen: list[Cut] = []
+    # Three cells, one of them only at the end of a word; then the hyphen. One cell is left out, one restated.
+    cut = Cut(4, 4, "⠼⠃⠒⠤", "⠤", "⠼", "⠒", "⠃⠃")
+    pages = list(paginate(words_of(["⠼" + "⠃" * 7]), layout, lambda *_: cut, lambda _, one: seen.append(one)))
+    assert [page.cells for page in pages] == ["⠼⠃⠒⠤⠀⠀", "⠼⠃⠃⠃⠃⠀"]
     goes_on = [page.goes_on for page in pages]
+    assert goes_on == [(GoesOn(0, "⠤", "⠼", "⠒", "⠃⠃"),), ()]
+    assert seen == [cut]
     assert join_pages([page.cells for page in pages], encoding, goes_on) == "⠼⠃⠃⠃⠃⠃⠃⠃"
     # What was to be there and is not felt is not taken out, so that it makes a difference.
-    assert join_pages(["⠼⠃⠃⠃⠀⠀", pages[1].cells], encoding, goes_on) == "⠼⠃⠃⠃⠀⠼⠃⠃⠃⠃"
-    assert join_pages([pages[0].cells, "⠃⠃⠃⠃⠀⠀"], encoding, goes_on) == "⠼⠃⠃⠃⠀⠃⠃⠃⠃"
+    assert join_pages(["⠼⠃⠒⠀⠀⠀", pages[1].cells], encoding, goes_on) == "⠼⠃⠒⠀⠼⠃⠃⠃⠃"
+    assert join_pages([pages[0].cells, "⠃⠃⠃⠃⠀⠀"], encoding, goes_on) == "⠼⠃⠀⠃⠃⠃⠃"
+    # Alone the first page ends as a word does, without the hyphen.
+    assert unmarked(pages[0].cells, encoding, pages[0].goes_on) == "⠼⠃⠒"
 
 
 def test_a_first_part_without_a_sign_ends_with_its_run():
-    layout = Layout(GridShape(6, 6), 3)
-    pages = [page.cells for page in paginate(words_of(["⠁" * 8]), layout, lambda *_: Cut(4, 4), lambda *_: None)]
+    layout, cut = Layout(GridShape(6, 6), 3), Cut(4, 4, "⠁" * 4)
+    pages = [page.cells for page in paginate(words_of(["⠁" * 8]), layout, lambda *_: cut, lambda *_: None)]
     assert pages == ["⠀⠀⠁⠁⠁⠁", "⠁⠁⠁⠁⠀⠀"]
 
 

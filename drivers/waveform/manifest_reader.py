@@ -55,8 +55,10 @@ class _Event(_Part):
 
 class _GoesOn(_Part):
     run: Index
-    mark: Words
-    restated: Words
+    mark: Words = ""
+    restated: Words = ""
+    ending: Words = ""
+    left_out: Words = ""
 
 
 class _Frame(_Part):
@@ -236,7 +238,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
         phase=_frozen(phase),
         moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
-        goes_on=tuple(GoesOn(one.run, one.mark, one.restated) for one in frame.goes_on),
+        goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
     )
 
 

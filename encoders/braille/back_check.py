@@ -7,8 +7,9 @@ beside that each page is read alone, with nothing known of the page before it.
 
 from __future__ import annotations
 
+import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -181,23 +182,45 @@ class _Reading:
         return _joined_cells(word for a, b in paragraphs for word in self.transcriber.words(source, a, b, log))
 
     def alone(self, pages: Iterable[FeltPage], encoding: Mapping[str, Any]) -> Iterator[Difference]:
-        """Pages that do not say what they show when nothing else is read."""
+        """Pages that do not say what they show when nothing else is read.
+
+        Of words that are whole on their page only digits and capitals are looked at, what indicators of a page before
+        could change: the letters of such words are those of the text already if all pages together are.
+        """
+        begun = False
         for number, page in enumerate(pages):
-            text = page.text.strip()
-            back = self._reads_as(unmarked(page.cells, encoding, page.goes_on), text) if text else text
+            text, goes_on = page.text.strip(), bool(page.goes_on)
+            back = self._reads_as(unmarked(page.cells, encoding, page.goes_on), text, begun, goes_on) if text else text
+            begun = goes_on
             if back != text:
                 yield Difference(text, back, number)
 
-    def _asked(self, cells: str, text: str) -> str:
-        """`text` when the cells say it, else what they say."""
+    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool) -> str:
+        """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""
         log = ReportLog()
         written = self.written(TextSource(text, SourceKind.TEXT, "page"), log)
         # The name of a character may be spread over pages that all show the one character.
         if cells == written or log.undefined_total:
             return text
-        back = back_translate(self.tables, cells)
-        same = "".join(_folded(back).split()) == "".join(_folded(text).split())
-        return text if same or back == back_translate(self.tables, written) else back
+        words = cells.split(BLANK)
+        parts = (not begun or written.startswith(words[0])) and (not goes_on or written.endswith(words[-1]))
+        if parts and not _indicated(text):
+            return text
+        back, likely = back_translate(self.tables, cells), back_translate(self.tables, written)
+        look: Callable[[str], str] = _indicated if parts else _letters
+        return text if look(back) in (look(text), look(likely)) else back
+
+
+def _letters(text: str) -> str:
+    return "".join(_folded(text).split())
+
+
+def _indicated(text: str) -> str:
+    return "".join(char for char in _UNREAD.sub("", text) if char.isdigit() or char.isupper())
+
+
+# Cells the table does not read, as the library shows them: their dots.
+_UNREAD = re.compile(r"\\[\d/-]+/")
 
 
 def _joined_cells(words: Iterable[Any]) -> str:

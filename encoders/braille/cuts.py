@@ -1,18 +1,18 @@
 """Where a word that has more cells than a run is cut, so that each part read alone says what it says in the word.
 
 Places are looked for in the text of the word: after its own separators, then (in words of letters) at the syllables
-of the dictionary, then between other letters; inside capitals and digits only where nothing else fits. Whether a
-place is sound is asked of the table, not known of the code: the rest of the word is written alone. What it has in
-front of the cells it has in the word are the indicators, which are restated; when the first part written alone has
-the cells it has in the word (or, where contractions depend on the whole word, both parts read as the word), the cut
-is sound. So no contraction is cut, and no indicator parted from what it governs, in any table.
+of the dictionary, then between other letters; inside capitals and digits only where nothing else fits. Both parts are
+written by the table as if each stood alone: so the second has its own indicators (a number sign, a sign of capitals),
+the first keeps none that governs the second, and no contraction is cut, in any table, without a rule of any code
+here. Of the places of one kind those come first where nothing but indicators changes; then those where a contraction
+over the place is dissolved, as UEB 10.13.2 and the German code (2.5.1.1) ask at the end of a line.
 
 What ends the first part:
 
 - nothing after a hyphen of the word's own;
 - in a word of letters the table's hyphen: UEB 10.13.1 divides words by it and keeps the line continuation indicator
   for other matter (so also NBA's answer at nationalbraille.org/forums/reply/38183), as does the German code (2.5.1.1,
-  rw-blindenschrift.de);
+  rw-blindenschrift.de/124/menu-rw-kap-2/menu-rw-kap-2-5.html);
 - in any other word, where a hyphen would be taken for the word's own, the code's sign of continuation: dot 5 in UEB
   (its line continuation indicator), dot 4 in German (braille.ch/urls-usw.htm). For other codes no rule was found:
   there nothing is added, and the indicators alone are restated.
@@ -27,21 +27,22 @@ import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from itertools import islice
 
 from . import louis_binding
+from .dots import BLANK
 from .layout import Cut
 from .undefined import ZERO_WIDTH_JOINER, extends
 
 __all__ = ["Cutter", "continuation_sign"]
 
-WINDOW = 64
-"""Characters of a word looked at together; of a longer one the next part is found in its first ones."""
-MARGIN = 12
-"""Cells at the end of a window that the characters after it may change."""
+MARGIN = 4
+"""Cells after a room that tell that a window of a long word is written as in the word."""
 SHORTEST_PIECE = 2
 """Letters that stand alone before or after a hyphen, at least."""
-MOST_RESTATED = 4
+MOST_CHANGED = 4
+"""Cells that a cut changes on each of its sides, at most; where more would change, the word is read as a whole."""
+MOST_TRIED = 8
 REMEMBERED = 1 << 14
 
 _HYPHENS = "-\u2010\u2011"
@@ -57,13 +58,6 @@ def continuation_sign(tables: tuple[str, ...]) -> str:
         if louis_binding.table_info(name, "language").split("-")[0] == "de" or os.path.basename(name).startswith("de-"):
             return "\u2808"
     return ""
-
-
-class _Place(NamedTuple):
-    """A sound place: the cells before it, and what is restated after it."""
-
-    cells: int
-    restated: str
 
 
 class Cutter:
@@ -87,40 +81,77 @@ class Cutter:
         self.hyphen, self.continuation = hyphen, continuation
         self._sound = lru_cache(maxsize=REMEMBERED)(self._asked)
 
-    def cut(self, text: str, cells: str, room: int, lettered: bool | None) -> Cut:
-        """Where to cut a word of `cells`, of which `room` fit."""
-        lettered = _lettered(text[:WINDOW]) if lettered is None else lettered
-        if len(text) <= 2 * WINDOW:
-            return self._sound(text, cells, room, lettered) or self._anywhere(text, cells, room, lettered)
-        head = text[: _cluster_start(text, WINDOW)]
+    def cut(self, text: str, cells: str, room: int, kept: int, lettered: bool | None) -> Cut:
+        """Where to cut a word of `cells`, of which `room` fit; the first `kept` of them stay as they are."""
+        window = 4 * room + 12
+        lettered = _lettered(text[:window]) if lettered is None else lettered
+        if len(text) <= window:
+            return self._sound(text, cells, room, kept, lettered) or self._anywhere(text, cells, room, lettered)
+        # Of a long word the next part is found in its first characters.
+        head = text[: _cluster_start(text, window)]
         start = self.write(head)
-        if cells.startswith(start[: room + MARGIN]) and len(start) > room + MARGIN:
-            found = self._sound(head, start, room, lettered)
-            if found is not None:
-                return found
-        return self._anywhere(head, cells, room, lettered)
+        seen = start[: room + MARGIN]
+        alike = len(start) > len(seen) and cells.startswith(seen)
+        found = self._sound(head, start, room, kept, lettered) if alike else None
+        return found or self._anywhere(head, cells, room, lettered)
 
-    def _asked(self, text: str, cells: str, room: int, lettered: bool) -> Cut | None:
-        places: dict[int, _Place | None] = {}
-        for options, at_syllable in self._options(text, lettered):
-            # How many cells stand before a place only grows with it: begin with the last that can fit.
-            last = bisect_right(options, room, key=lambda at: self._cells_before(text, cells, at))
-            for at in reversed(options[:last]):
-                if at not in places:
-                    places[at] = self._place(text, cells, at)
-                place = places[at]
-                if place is None:
-                    continue
-                mark = self._mark(text, at, cells[: place.cells], lettered)
-                if 0 < place.cells <= room - len(mark):
-                    return Cut(at, place.cells, mark, place.restated, at_syllable, lettered)
+    def _asked(self, text: str, cells: str, room: int, kept: int, lettered: bool) -> Cut | None:
+        for cut_at in (self._apart, self._in_context):
+            for options, at_syllable in self._options(text, lettered):
+                last = self._fitting(text, options, room)
+                tried = (cut_at(text, cells, at, kept) for at in reversed(options[:last]))
+                found = [cut for cut in islice(tried, MOST_TRIED) if cut is not None]
+                signed = [self._signed(cut, text, at_syllable, lettered) for cut in found]
+                cuts = [cut for cut in signed if len(cut.first) <= room]
+                if cuts:
+                    return next((cut for cut in cuts if not cut.left_out), cuts[0])
         return None
+
+    def _fitting(self, text: str, options: Sequence[int], room: int) -> int:
+        """How many of the options leave a first part that can fit: it only grows with the place."""
+        near = bisect_right(options, 2 * room)
+        last = bisect_right(options, room, 0, near, key=lambda at: len(self.write(text[:at])))
+        if last < near:
+            return last
+        return bisect_right(options, room, near, key=lambda at: len(self.write(text[:at])))
+
+    def _apart(self, text: str, cells: str, at: int, kept: int) -> Cut | None:
+        """Both parts written alone; None where that changes too much."""
+        first, rest = self.write(text[:at]), self.write(text[at:])
+        end = _common_end(rest, cells)
+        start = min(_common_start(first, cells), len(cells) - end)
+        added, restated, left_out = first[start:], rest[: len(rest) - end], cells[start : len(cells) - end]
+        if (
+            not rest
+            or BLANK in first
+            or start < max(kept, 1)
+            or max(len(added), len(restated), len(left_out)) > MOST_CHANGED
+        ):
+            return None
+        return Cut(at, len(cells) - end, first, "", restated, added, left_out)
+
+    def _in_context(self, text: str, cells: str, at: int, kept: int) -> Cut | None:
+        """The first part with the cells it has in the word (an address is written as one), if both read as the word."""
+        rest = self.write(text[at:])
+        end = _common_end(rest, cells)
+        first, restated = cells[: len(cells) - end], rest[: len(rest) - end]
+        if not end or len(first) <= kept or len(restated) > MOST_CHANGED:
+            return None
+        if self.read(first) + self.read(rest) != self.read(cells):
+            return None
+        return Cut(at, len(first), first, "", restated)
+
+    def _signed(self, cut: Cut, text: str, at_syllable: bool, lettered: bool) -> Cut:
+        sign = self.hyphen if lettered else self.continuation
+        if text[cut.text - 1] in _HYPHENS and (not self.hyphen or cut.first.endswith(self.hyphen)):
+            sign = ""
+        return cut._replace(first=cut.first + sign, mark=sign, hyphenated=at_syllable, lettered=lettered)
 
     def _options(self, text: str, lettered: bool) -> Iterator[tuple[list[int], bool]]:
         """Places in the text, the best kind first; whether they are syllables."""
         yield [at for at in range(1, len(text)) if _separated(text, at)], False
-        inner = [at for at in range(1, len(text)) if _cluster_start(text, at) == at]
-        inner = [at for at in inner if _letters(text[:at]) and _letters(text[at:])]
+        whole = [at for at in range(1, len(text)) if _cluster_start(text, at) == at]
+        inner = [at for at in whole if _letters(text[:at]) and _letters(text[at:])]
         if lettered:
             # A piece of one letter would be read as a word of its own.
             fair = [at for at in inner if _letters(text[:at]) >= SHORTEST_PIECE <= _letters(text[at:])]
@@ -130,49 +161,19 @@ class Cutter:
             yield [at for at in inner if _changes(text[at - 1], text[at])], False
             yield [at for at in inner if _small(text[at - 1]) and _small(text[at])], False
         yield inner, False
-
-    def _cells_before(self, text: str, cells: str, at: int) -> int:
-        return len(cells) - _common_end(self.write(text[at:]), cells)
-
-    def _place(self, text: str, cells: str, at: int) -> _Place | None:
-        """What a cut before character `at` makes of the cells, None when it is not sound."""
-        rest = self.write(text[at:])
-        common = _common_end(rest, cells)
-        before, restated = cells[: len(cells) - common], rest[: len(rest) - common]
-        if not common or not before or len(restated) > MOST_RESTATED:
-            return None
-        sound = self._sound_start(text, at, before) or self._reads(text, at, before, rest, cells)
-        return _Place(len(before), restated) if sound else None
-
-    def _sound_start(self, text: str, at: int, before: str) -> bool:
-        """Whether the first part is written so alone, a separator at its end apart: alone it may be a full stop."""
-        if self.write(text[:at]) == before:
-            return True
-        written = self.write(text[: at - 1]) if _separated(text, at) else before
-        return before.startswith(written) and 0 < len(before) - len(written) <= MOST_RESTATED
-
-    def _reads(self, text: str, at: int, before: str, rest: str, cells: str) -> bool:
-        """Whether both parts read as the word, and no indicator of the rest is left with the first."""
-        if before.startswith(self.write(text[:at])):
-            return False
-        return self.read(before) + self.read(rest) == self.read(cells)
-
-    def _mark(self, text: str, at: int, before: str, lettered: bool) -> str:
-        if text[at - 1] in _HYPHENS and (not self.hyphen or before.endswith(self.hyphen)):
-            return ""
-        return self.hyphen if lettered else self.continuation
+        yield whole, False
 
     def _anywhere(self, text: str, cells: str, room: int, lettered: bool) -> Cut:
-        """No place is sound: one whose first part at least is written so alone, else the last cell."""
-        mark = self.hyphen if lettered else self.continuation
-        mark = mark if len(mark) < room else ""
-        most = room - len(mark)
-        for at in range(len(text) - 1, 0, -1):
-            before = self.write(text[:at])
-            if before and len(before) <= most and cells.startswith(before) and at == _cluster_start(text, at):
-                return Cut(at, len(before), mark, "", False, lettered)
-        at = max((at for at in range(len(text)) if len(self.write(text[:at])) <= most), default=0)
-        return Cut(at, most, mark, "", False, lettered)
+        """The last place whose first part at least is written so alone; else the last cell."""
+        sign = self.hyphen if lettered else self.continuation
+        sign = sign if len(sign) < room else ""
+        most = room - len(sign)
+        starts = [(at, self.write(text[:at])) for at in range(1, min(len(text), 4 * room))]
+        starts = [(at, start) for at, start in starts if 0 < len(start) <= most]
+        at, first = next((one for one in reversed(starts) if cells.startswith(one[1])), (0, ""))
+        if not first:
+            at, first = starts[-1][0] if starts else 0, cells[:most]
+        return Cut(at, len(first), first + sign, sign, lettered=lettered)
 
 
 def _lettered(text: str) -> bool:
@@ -208,6 +209,10 @@ def _small(char: str) -> bool:
 def _common_end(one: str, other: str) -> int:
     shorter = min(len(one), len(other))
     return next((at for at in range(shorter) if one[-1 - at] != other[-1 - at]), shorter)
+
+
+def _common_start(one: str, other: str) -> int:
+    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
 
 
 def _cluster_start(text: str, at: int) -> int:

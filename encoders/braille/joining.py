@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import repeat
 from typing import Any
 
@@ -37,13 +38,13 @@ def join_pages(
             if added is None or not following.startswith(added.restated or _DOTS):
                 parts.append(BLANK)
             else:
-                parts[-1] = parts[-1].removesuffix(added.mark)
+                parts[-1] = parts[-1].removesuffix(added.ending + added.mark) + added.left_out
                 run = following[len(added.restated) :]
             parts.append(run.rstrip(BLANK))
             added = _guessed(parts[-1], size, encoding) if notes is None else _noted(notes, number, parts[-1])
             if notes is not None and added is not None:
-                parts[-1] = parts[-1].removesuffix(added.mark)
-                added = GoesOn(number, "", added.restated)
+                parts[-1] = parts[-1].removesuffix(added.ending + added.mark)
+                added = GoesOn(number, "", added.restated, "", added.left_out)
     return BLANK.join(part for part in "".join(parts).split(BLANK) if part)
 
 
@@ -51,15 +52,15 @@ _DOTS = tuple(chr(code) for code in range(0x2801, 0x2900))
 
 
 def _noted(notes: Sequence[GoesOn], number: int, shown: str) -> GoesOn | None:
-    return next((note for note in notes if note.run == number and shown.endswith(note.mark)), None)
+    return next((note for note in notes if note.run == number and shown.endswith(note.ending + note.mark)), None)
 
 
 def _guessed(shown: str, size: int, encoding: Mapping[str, Any]) -> GoesOn | None:
     hyphen = str(encoding["hyphen"])
     for mark in (hyphen, str(encoding.get("continuation", ""))):
         if mark and shown.endswith(mark):
-            return GoesOn(0, mark, "")
-    return GoesOn(0, "", "") if not hyphen and len(shown) == size else None
+            return GoesOn(0, mark)
+    return GoesOn(0) if not hyphen and len(shown) == size else None
 
 
 def unmarked(page: str, encoding: Mapping[str, Any], goes_on: Sequence[GoesOn]) -> str:
@@ -67,4 +68,5 @@ def unmarked(page: str, encoding: Mapping[str, Any], goes_on: Sequence[GoesOn]) 
 
     Indicators restated at the start of a run stay at the start of the page; within it they are taken out.
     """
-    return join_pages([page], encoding, [goes_on])
+    last = len(page.replace("\n", "")) // int(encoding["run"]) - 1
+    return join_pages([page], encoding, [[replace(one, ending="") if one.run == last else one for one in goes_on]])

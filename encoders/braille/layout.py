@@ -85,7 +85,7 @@ class PlacedWord(NamedTuple):
 
     `text` is what the table was given for the word; its character k comes from the source position
     ``base + places[at + k]``, or ``base + at + k`` without `places`. `glued` continues the word before it; `lettered`
-    says whether it is a word of letters (None: not asked yet).
+    says whether it is a word of letters (None: not asked yet), `kept` how many of its first cells are restated.
     """
 
     cells: str
@@ -97,6 +97,7 @@ class PlacedWord(NamedTuple):
     base: int
     glued: bool
     lettered: bool | None = None
+    kept: int = 0
 
     def source(self, index: int) -> int:
         """Position in the source of character `index` of `text`."""
@@ -105,16 +106,21 @@ class PlacedWord(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Where a word is cut.
+    """Where a word is cut, and how its parts are written.
 
-    `text` and `cells` are the lengths of the first part, `mark` is written behind it, `restated` before the rest.
-    `hyphenated` is said of a cut at a syllable, `lettered` of a word of letters.
+    `text` and `cells` say how much of the word is behind us then. `first` is what is written of it, with the `mark`
+    at its end and the `ending` before that, which are not of the word; `restated` is written before the rest, and
+    `left_out` are the word's cells that stand in neither part. `hyphenated` is said of a cut at a syllable,
+    `lettered` of a word of letters.
     """
 
     text: int
     cells: int
+    first: str
     mark: str = ""
     restated: str = ""
+    ending: str = ""
+    left_out: str = ""
     hyphenated: bool = False
     lettered: bool = False
 
@@ -135,7 +141,7 @@ Cutting = Callable[[PlacedWord, int], Cut]
 
 def cut_anywhere(word: PlacedWord, room: int) -> Cut:
     """The cut at the last cell of `room`, for words without a text of their own."""
-    return Cut(room, room)
+    return Cut(room, room, word.cells[:room])
 
 
 @dataclass
@@ -270,13 +276,16 @@ def _fitted(word: PlacedWord, filler: _Filler, cut: Cutting, note: SplitNote) ->
 
 def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None, PlacedWord]:
     """Place the first part of a word, and give the rest."""
-    part = word.cells[: found.cells] + found.mark
     signs = tuple(sign for sign in (filler.layout.hyphen, filler.layout.continuation) if sign)
-    marked = bool(signs) and part.endswith(signs)
-    position = filler.indent(word) if marked else filler.size - len(part)
-    end = max(word.source(found.text), word.start + 1) if found.text < len(word.text) else word.end
-    filler.place(position, part, word, end)
-    filler.goes_on.append(GoesOn(len(filler.done), found.mark, found.restated))
+    marked = bool(signs) and found.first.endswith(signs)
+    position = filler.indent(word) if marked else filler.size - len(found.first)
+    end = word.end
+    if 0 < found.text < len(word.text):
+        after = word.source(found.text)
+        # A character whose name is cut is shown on this page, too.
+        end = max(after + (after == word.source(found.text - 1)), word.start + 1)
+    filler.place(position, found.first, word, end)
+    filler.goes_on.append(GoesOn(len(filler.done), found.mark, found.restated, found.ending, found.left_out))
     yield from filler.end_run(False)
     return word._replace(
         cells=found.restated + word.cells[found.cells :],
@@ -284,4 +293,5 @@ def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None
         at=word.at + found.text,
         start=min(end, word.end - 1),
         lettered=found.lettered,
+        kept=len(found.restated),
     )

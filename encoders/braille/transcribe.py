@@ -25,6 +25,8 @@ PIECE = 2000
 PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
+_LATIN = re.compile("[A-Za-z]")
+_NO_LATIN = re.compile("[\u0370-\u1cff\u2e80-\ud7ff]")
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
@@ -135,17 +137,14 @@ class Transcriber:
         held: PlacedWord | None = None
         for base, stop, glued in _pieces(text, start, end):
             cells, origin, ready = self._piece(source, base, stop, log)
-            at = 0
+            at = done = 0
             for word in cells.split(BLANK):
                 if word:
-                    here, after = (
-                        origin[at],
-                        origin[at + len(word)] if at + len(word) < len(origin) else len(ready.text),
-                    )
+                    here, done = _said(ready.text, origin, at, at + len(word), done)
                     first = base + (here if ready.origins is None else ready.origins[here])
                     if held is not None:
                         yield held._replace(end=_end(text, held.start, first))
-                    said = ready.text[here : max(after, here + 1)].rstrip()
+                    said = ready.text[here : max(done, here + 1)].rstrip()
                     joined = glued and at == 0 and held is not None
                     held = PlacedWord(word, said, first, first, ready.origins, here, base, joined)
                 at += len(word) + 1
@@ -190,7 +189,9 @@ class Transcriber:
         """Where a word of text is cut that has more cells than `room`; see `encoders.braille.cuts`."""
         if not word.text:
             return cut_anywhere(word, room)
-        return _cutter(self.tables, self.dots, hyphen, continuation).cut(word.text, word.cells, room, word.lettered)
+        return _cutter(self.tables, self.dots, hyphen, continuation).cut(
+            word.text, word.cells, room, word.kept, word.lettered
+        )
 
 
 @lru_cache(maxsize=16)
@@ -200,6 +201,7 @@ def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) 
     @lru_cache(maxsize=1 << 14)
     def write(text: str) -> str:
         cells, _, _ = _translated(tables, text)
+        cells = cells.strip(BLANK)
         return cells.translate(LOWER_SIX) if dots == 6 else cells
 
     @lru_cache(maxsize=1 << 12)
@@ -217,16 +219,28 @@ def _points(tables: tuple[str, ...], word: str) -> list[int]:
     return louis_binding.hyphenate(tables, word)
 
 
+def _said(text: str, origin: list[int], at: int, stop: int, done: int) -> tuple[int, int]:
+    """(start, end) in `text` of the word whose cells are ``at:stop``, after one that ended at `done`."""
+    # The first cell of a letter with its accent may come from the second of its characters; a blank need not come
+    # from a space.
+    after_space = done and text[done : done + 1].isspace()
+    start = origin[at] - len(text[done : origin[at]].lstrip()) if after_space or not done else origin[at]
+    if stop < len(origin) and not text[origin[stop]].isspace():
+        stop += 1
+    return start, origin[stop] if stop < len(origin) else len(text)
+
+
 def _apart(text: str) -> Iterator[tuple[int, int]]:
-    """(start, end) of parts, so that no two words of capitals are in one."""
+    """(start, end) of parts, so that no two words of capitals, or of Latin letters in another script, are in one."""
     start, before = 0, False
-    if any(one.isupper() for one in text.split()):
+    other = _NO_LATIN.search(text) is not None
+    if any(one.isupper() or (other and _LATIN.search(one)) for one in text.split()):
         for match in _WORD.finditer(text):
-            capitals = match[0].isupper()
-            if capitals and before:
+            marked = match[0].isupper() or (other and _LATIN.search(match[0]) is not None)
+            if marked and before:
                 yield start, match.start()
                 start = match.start()
-            before = capitals
+            before = marked
     yield start, len(text)
 
 
