@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import unicodedata
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -132,8 +134,7 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
         eight, what = max(source.text) > HIGHEST_6_DOT, f"{source.name} holds 8-dot cells"
     else:
         stated = table_dots(tables)
-        letters = (char for char in sorted(set(source.text)) if char.isalnum())
-        eight = stated == 8 or (not stated and any(alphabet(tables).dots(char) == 8 for char in letters))
+        eight = stated == 8 or (not stated and _own_letters_eight(source.text, tables))
         what = f"table {','.join(tables)} writes 8-dot cells"
     if not eight:
         return 6
@@ -143,6 +144,20 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
             "or give --dots 6 (dots 7 and 8 are left out)"
         )
     return 8
+
+
+def _own_letters_eight(text: str, tables: tuple[str, ...]) -> bool:
+    """Whether letters of the text's own script have 8-dot signs; words of another are written with six."""
+    letters = Counter({char: count for char, count in Counter(text).items() if char.isalnum()})
+    scripts = Counter[str]()
+    for char, count in letters.items():
+        scripts[_script(char)] += count
+    own = max(scripts, key=scripts.__getitem__, default="")
+    return any(alphabet(tables).dots(char) == 8 for char in sorted(letters) if _script(char) == own)
+
+
+def _script(char: str) -> str:
+    return unicodedata.name(char, "").partition(" ")[0]
 
 
 def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:

@@ -27,6 +27,7 @@ _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
 _LATIN = re.compile("[A-Za-z]")
 _NO_LATIN = re.compile("[\u0370-\u1cff\u2e80-\ud7ff]")
+_ARROWS = "\u2190"
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
@@ -163,8 +164,11 @@ class Transcriber:
             for at, cell in enumerate(cells):
                 if cell > HIGHEST_6_DOT:
                     place = origin[at] if ready.origins is None else ready.origins[origin[at]]
-                    log.undefined(chunk[place], "six dots", cell.translate(LOWER_SIX), start + place)
-            cells = cells.translate(LOWER_SIX)
+                    log.undefined(chunk[place], "six dots", _six_dots(cell), start + place)
+            origin = [
+                position for position, cell in zip(origin, cells, strict=True) if cell == BLANK or _six_dots(cell)
+            ]
+            cells = _six_dots(cells)
         return cells, origin, ready
 
     def _written(self, text: str) -> tuple[str, list[int]]:
@@ -194,6 +198,14 @@ class Transcriber:
         )
 
 
+def _six_dots(cells: str) -> str:
+    """Cells without dots 7 and 8; one that had no other dots is left out, as a blank there would end the word."""
+    return cells.translate(_ONLY_LOWER).translate(LOWER_SIX)
+
+
+_ONLY_LOWER = dict.fromkeys((0x2840, 0x2880, 0x28C0))
+
+
 @lru_cache(maxsize=16)
 def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) -> Cutter:
     together = hyphenation_tables(tables) if hyphen else ()
@@ -202,7 +214,7 @@ def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) 
     def write(text: str) -> str:
         cells, _, _ = _translated(tables, text)
         cells = cells.strip(BLANK)
-        return cells.translate(LOWER_SIX) if dots == 6 else cells
+        return _six_dots(cells) if dots == 6 else cells
 
     @lru_cache(maxsize=1 << 12)
     def read(cells: str) -> str:
@@ -268,9 +280,10 @@ def _pieces(text: str, start: int, end: int) -> Iterator[tuple[int, int, bool]]:
             spaces = [match.start() for match in _SPACE.finditer(text, start + 1, window)]
             cut = spaces[-1] if spaces else _hard_cut(text, start, min(window, (start + end) // 2 + 1))
         yield start, cut, glued
-        glued = not (text[cut].isspace() or text[cut - 1].isspace())
+        glued = cut < end and not (text[cut].isspace() or text[cut - 1].isspace())
         start = cut
-    yield start, end, glued
+    if start < end:
+        yield start, end, glued
 
 
 def _hard_cut(text: str, start: int, cut: int) -> int:
@@ -282,4 +295,7 @@ def _hard_cut(text: str, start: int, cut: int) -> int:
     while back - flags > start and "\U0001f1e6" <= text[back - flags - 1] <= "\U0001f1ff":
         flags += 1
     back -= flags % 2
-    return back if back > start else cut
+    back = back if back > start else cut
+    while back < len(text) and text[back] == text[back - 1] and text[back] > _ARROWS and not text[back].isalnum():
+        back += 1  # equal signs are counted together, see `undefined`
+    return back
