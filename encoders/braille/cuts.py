@@ -27,7 +27,7 @@ import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
-from itertools import islice
+from itertools import accumulate, islice
 
 from . import louis_binding
 from .dots import BLANK
@@ -36,6 +36,8 @@ from .undefined import ZERO_WIDTH_JOINER, extends
 
 __all__ = ["Cutter", "continuation_sign"]
 
+LONGEST = 120
+"""Characters of a word looked at together, at most (or four times those of a run)."""
 MARGIN = 4
 """Cells after a room that tell that a window of a long word is written as in the word."""
 SHORTEST_PIECE = 2
@@ -83,8 +85,9 @@ class Cutter:
 
     def cut(self, text: str, cells: str, room: int, kept: int, lettered: bool | None) -> Cut:
         """Where to cut a word of `cells`, of which `room` fit; the first `kept` of them stay as they are."""
-        window = 4 * room + 12
-        lettered = _lettered(text[:window]) if lettered is None else lettered
+        lettered = _lettered(text[:LONGEST]) if lettered is None else lettered
+        # An address is written as one by its first and last characters.
+        window = 4 * room + 12 if lettered else max(4 * room, LONGEST)
         if len(text) <= window:
             return self._sound(text, cells, room, kept, lettered) or self._anywhere(text, cells, room, lettered)
         # Of a long word the next part is found in its first characters.
@@ -96,15 +99,18 @@ class Cutter:
         return found or self._anywhere(head, cells, room, lettered)
 
     def _asked(self, text: str, cells: str, room: int, kept: int, lettered: bool) -> Cut | None:
-        for cut_at in (self._apart, self._in_context):
+        for cut_at in (self._apart, self._read_alike, self._in_context):
             for options, at_syllable in self._options(text, lettered):
                 last = self._fitting(text, options, room)
-                tried = (cut_at(text, cells, at, kept) for at in reversed(options[:last]))
-                found = [cut for cut in islice(tried, MOST_TRIED) if cut is not None]
-                signed = [self._signed(cut, text, at_syllable, lettered) for cut in found]
-                cuts = [cut for cut in signed if len(cut.first) <= room]
-                if cuts:
-                    return next((cut for cut in cuts if not cut.left_out), cuts[0])
+                tried = (cut_at(text, cells, at, kept) for at in islice(reversed(options[:last]), MOST_TRIED))
+                signed = (self._signed(cut, text, at_syllable, lettered) for cut in tried if cut is not None)
+                best: Cut | None = None
+                for cut in (cut for cut in signed if len(cut.first) <= room):
+                    if not cut.left_out:
+                        return cut
+                    best = best or cut
+                if best is not None:
+                    return best
         return None
 
     def _fitting(self, text: str, options: Sequence[int], room: int) -> int:
@@ -130,14 +136,18 @@ class Cutter:
             return None
         return Cut(at, len(cells) - end, first, "", restated, added, left_out)
 
+    def _read_alike(self, text: str, cells: str, at: int, kept: int) -> Cut | None:
+        """As `_in_context`, where both parts read as the word."""
+        cut = self._in_context(text, cells, at, kept)
+        alike = cut and self.read(cut.first) + self.read(self.write(text[at:])) == self.read(cells)
+        return cut if alike else None
+
     def _in_context(self, text: str, cells: str, at: int, kept: int) -> Cut | None:
-        """The first part with the cells it has in the word (an address is written as one), if both read as the word."""
+        """The first part with the cells it has in the word, as an address is written as one; the rest written alone."""
         rest = self.write(text[at:])
         end = _common_end(rest, cells)
         first, restated = cells[: len(cells) - end], rest[: len(rest) - end]
-        if not end or len(first) <= kept or len(restated) > MOST_CHANGED:
-            return None
-        if self.read(first) + self.read(rest) != self.read(cells):
+        if not end or len(first) <= kept or len(restated) > MOST_CHANGED or (restated and first[-1] in restated):
             return None
         return Cut(at, len(first), first, "", restated)
 
@@ -150,18 +160,21 @@ class Cutter:
     def _options(self, text: str, lettered: bool) -> Iterator[tuple[list[int], bool]]:
         """Places in the text, the best kind first; whether they are syllables."""
         yield [at for at in range(1, len(text)) if _separated(text, at)], False
-        whole = [at for at in range(1, len(text)) if _cluster_start(text, at) == at]
-        inner = [at for at in whole if _letters(text[:at]) and _letters(text[at:])]
+        before = list(accumulate((char.isalnum() for char in text), initial=0))
+
+        def fair(at: int, least: int) -> bool:
+            return before[at] >= least <= before[-1] - before[at] and _cluster_start(text, at) == at
+
         if lettered:
             # A piece of one letter would be read as a word of its own.
-            fair = [at for at in inner if _letters(text[:at]) >= SHORTEST_PIECE <= _letters(text[at:])]
-            yield [at for at in self.points(text) if at in fair], True
-            yield fair, False
+            yield [at for at in self.points(text) if fair(at, SHORTEST_PIECE)], True
+            yield [at for at in range(1, len(text)) if fair(at, SHORTEST_PIECE)], False
         else:
-            yield [at for at in inner if _changes(text[at - 1], text[at])], False
-            yield [at for at in inner if _small(text[at - 1]) and _small(text[at])], False
-        yield inner, False
-        yield whole, False
+            yield [at for at in range(1, len(text)) if fair(at, 1) and _changes(text[at - 1], text[at])], False
+            small = [at for at in range(1, len(text)) if _small(text[at - 1]) and _small(text[at])]
+            yield [at for at in small if fair(at, 1)], False
+        yield [at for at in range(1, len(text)) if fair(at, 1)], False
+        yield [at for at in range(1, len(text)) if fair(at, 0)], False
 
     def _anywhere(self, text: str, cells: str, room: int, lettered: bool) -> Cut:
         """The last place whose first part at least is written so alone; else the last cell."""
@@ -182,10 +195,6 @@ def _lettered(text: str) -> bool:
     last = next((at for at in range(len(text) - 1, -1, -1) if text[at].isalnum() or extends(text[at])), -1)
     core = text[first : last + 1]
     return bool(core) and all(char.isalpha() or extends(char) or char in _IN_WORDS for char in core)
-
-
-def _letters(text: str) -> int:
-    return sum(char.isalnum() for char in text)
 
 
 def _separated(text: str, at: int) -> bool:

@@ -279,11 +279,13 @@ def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None
     signs = tuple(sign for sign in (filler.layout.hyphen, filler.layout.continuation) if sign)
     marked = bool(signs) and found.first.endswith(signs)
     position = filler.indent(word) if marked else filler.size - len(found.first)
-    end = word.end
+    end = start = word.end
     if 0 < found.text < len(word.text):
-        after = word.source(found.text)
-        # A character whose name is cut is shown on this page, too.
-        end = max(after + (after == word.source(found.text - 1)), word.start + 1)
+        start = word.source(found.text)
+        # A character whose name is cut is shown on both pages.
+        shared = start == word.source(found.text - 1)
+        end = start + 1 if shared else max(start, word.start + 1)
+        start = start if shared else end
     filler.place(position, found.first, word, end)
     filler.goes_on.append(GoesOn(len(filler.done), found.mark, found.restated, found.ending, found.left_out))
     yield from filler.end_run(False)
@@ -291,7 +293,7 @@ def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None
         cells=found.restated + word.cells[found.cells :],
         text=word.text[found.text :],
         at=word.at + found.text,
-        start=min(end, word.end - 1),
+        start=min(start, word.end - 1),
         lettered=found.lettered,
         kept=len(found.restated),
     )

@@ -145,7 +145,9 @@ def _form(cluster: str, position: int, alphabet: Alphabet, log: ReportLog) -> st
     for same in _same(visible, alphabet):
         if not alphabet.lacks(same):
             return same
-    for compatible in (unicodedata.normalize("NFKC", visible), unicodedata.normalize("NFKD", visible)):
+    # Every dash is at least a hyphen, such as the Hebrew maqaf.
+    hyphen = "-" if unicodedata.category(visible[0]) == "Pd" and len(visible) == 1 else ""
+    for compatible in (unicodedata.normalize("NFKC", visible), unicodedata.normalize("NFKD", visible), hyphen):
         if compatible.strip() and not alphabet.lacks(compatible):
             log.undefined(cluster, "respelled", compatible, position)
             return compatible
