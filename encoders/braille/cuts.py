@@ -201,7 +201,7 @@ def _separated(text: str, at: int) -> bool:
     """Whether a separator of the word's own ends before `at`, with something to read on both sides."""
     before, after = text[at - 1], text[at]
     return (
-        before in _SEPARATORS
+        (before in _SEPARATORS or before.isspace())
         and (after.isalnum() or after in "([{\u00ab\u201c")
         and any(char.isalnum() for char in text[:at])
     )

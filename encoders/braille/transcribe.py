@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from ..errors import TableMissing
 from . import louis_binding
@@ -25,9 +25,8 @@ PIECE = 2000
 PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
-_LATIN = re.compile("[A-Za-z]")
-_NO_LATIN = re.compile("[\u0370-\u1cff\u2e80-\ud7ff]")
 _ARROWS = "\u2190"
+_NO_ARROWS = "\u2190"
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
@@ -173,7 +172,7 @@ class Transcriber:
 
     def _written(self, text: str) -> tuple[str, list[int]]:
         cells, origin = "", list[int]()
-        for start, stop in [(0, len(text))] if self.passages else _apart(text):
+        for start, stop in [(0, len(text))] if self.passages else _apart(self.tables, text):
             some, back, _ = _translated(self.tables, text[start:stop])
             cells += some
             origin += [start + position for position in back] if start else back
@@ -242,18 +241,36 @@ def _said(text: str, origin: list[int], at: int, stop: int, done: int) -> tuple[
     return start, origin[stop] if stop < len(origin) else len(text)
 
 
-def _apart(text: str) -> Iterator[tuple[int, int]]:
-    """(start, end) of parts, so that no two words of capitals, or of Latin letters in another script, are in one."""
-    start, before = 0, False
-    other = _NO_LATIN.search(text) is not None
-    if any(one.isupper() or (other and _LATIN.search(one)) for one in text.split()):
+def _apart(tables: tuple[str, ...], text: str) -> Iterator[tuple[int, int]]:
+    """(start, end) of parts, so that no two words that one indicator would stand for are in one."""
+    start, before = 0, frozenset[str]()
+    kinds = _passages(tables)
+    if any(_MARKED[kind](text) for kind in kinds):
         for match in _WORD.finditer(text):
-            marked = match[0].isupper() or (other and _LATIN.search(match[0]) is not None)
-            if marked and before:
+            marked = frozenset(kind for kind in kinds if _MARKED[kind](match[0]))
+            if marked & before:
                 yield start, match.start()
                 start = match.start()
-            before = marked
+            # A word without letters, such as a number, does not end a passage.
+            before = marked | before if not any(char.isalpha() for char in match[0]) else marked
     yield start, len(text)
+
+
+_MARKED: dict[str, Callable[[str], object]] = {
+    "AB": lambda text: not text.islower() and any(word.isupper() for word in text.split()),
+    "ab": re.compile("[A-Za-z]").search,
+}
+"""For each sort of words an example, and what tells that there are such in a text."""
+
+
+@cache
+def _passages(tables: tuple[str, ...]) -> tuple[str, ...]:
+    """Sorts of words that the tables mark once where several of them follow."""
+
+    def written(text: str) -> str:
+        return _translated(tables, text)[0]
+
+    return tuple(kind for kind in _MARKED if written(" ".join([kind] * 4)) != BLANK.join([written(kind)] * 4))
 
 
 def _end(text: str, start: int, following: int) -> int:
