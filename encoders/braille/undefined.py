@@ -79,7 +79,9 @@ def writable(chunk: str, base: int, alphabet: Alphabet, policy: Undefined, log: 
         When the policy is `error` and a character cannot be written.
     """
     text = chunk.translate(_SPACES)
-    plain = not _INVISIBLE.search(text) and not _TURNED.search(text) and unicodedata.is_normalized("NFC", text)
+    plain = not any(special.search(text) for special in (_INVISIBLE, _TURNED, _TERMINAL)) and unicodedata.is_normalized(
+        "NFC", text
+    )
     if plain and not alphabet.lacks(text):
         return Writable(text, None)
     parts: list[str] = []
