@@ -130,6 +130,7 @@ def test_compatible_forms_are_written_and_reported():
         ("he-IL.utb", "\ufb2a\u05b8לו\u05b9ם"),
         ("el.ctb", "τι\u037e ναι\u0387 όχι"),
         ("pu-in-g1.utb", "\u0a36 \u0a33"),
+        ("pa.tbl", "ਸਖਤ\u0a3c"),
         ("en-ueb-g2.ctb", "\u2329a\u232a \u212b"),
     ],
 )

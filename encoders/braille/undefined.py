@@ -145,7 +145,7 @@ def _form(cluster: str, position: int, alphabet: Alphabet, log: ReportLog) -> st
         log.invisible += 1
         return ""
     for same in _same(visible, alphabet):
-        if not alphabet.lacks(same):
+        if not alphabet.lacks(same) or (len(same) > 1 and alphabet.spells(same)):
             return same
     # Every dash is at least a hyphen, such as the Hebrew maqaf.
     hyphen = "-" if unicodedata.category(visible[0]) == "Pd" and len(visible) == 1 else ""
