@@ -143,7 +143,9 @@ class Transcriber:
                     here, done = _said(ready.text, origin, at, at + len(word), done)
                     first = base + (here if ready.origins is None else ready.origins[here])
                     if held is not None:
-                        yield held._replace(end=_end(text, held.start, first))
+                        # The name of one character may be several words, which all show it.
+                        shown = max(first, held.source(max(len(held.text) - 1, 0)) + 1)
+                        yield held._replace(end=_end(text, held.start, shown))
                     said = ready.text[here : max(done, here + 1)].rstrip()
                     joined = glued and at == 0 and held is not None
                     held = PlacedWord(word, said, first, first, ready.origins, here, base, joined)
