@@ -133,7 +133,7 @@ def _report(device: Device, scene: TextScene, watch: _Watch, written: WrittenWav
         undefined=_undefined(encoded),
         split=tuple(
             f"{split.word!r} at character {split.span[0]}, page {split.page + 1}, "
-            + ("hyphenated" if split.hyphenated else "at the last cell")
+            + ("hyphenated" if split.hyphenated else "not at a syllable")
             for split in encoded.splits
         ),
         differences=differences,
