@@ -117,3 +117,13 @@ def test_the_corpus_of_the_library_is_felt_as_its_authors_expect():
     assert [one for one in wrong if not any(char in one for char in soft_or_turned)] == []
     assert len(wrong) < 30
     assert refused == 0
+
+
+WORDS = yaml.safe_load((Path(__file__).parent / "data" / "braille_words.yaml").read_text())
+
+
+@pytest.mark.parametrize("shape", [SMALL, LARGE], ids=["6x6", "40x96"])
+@pytest.mark.parametrize("table", WORDS)
+def test_words_of_many_languages_are_felt_as_the_table_writes_them(table, shape):
+    for text, cells in WORDS[table].items():
+        assert felt(Case("", table, text, cells), shape) == cells, text
