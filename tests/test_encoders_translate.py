@@ -178,6 +178,24 @@ def test_repeats_of_a_named_sign_are_counted():
     assert write("x\u0304x\u0304", "hi-in-g1.utb").text == "x(combining macron)" * 2
 
 
+@pytest.mark.parametrize(
+    ("table", "name"),
+    [
+        ("de-g2.ctb", "gesicht mit freudentränen"),
+        ("fr-bfu-g2.ctb", "visage riant aux larmes"),
+        ("ru-litbrl.ctb", "смеется до слез"),
+        ("hi-in-g1.utb", "खुशी के आँसुओं वाला चेहरा"),
+    ],
+)
+def test_signs_are_named_in_the_language_of_the_table(table, name):
+    assert write("😂", table).text.strip("()").casefold() == name
+    assert write("😂😂", table).text.strip("()").casefold() == f"{name} × 2"
+
+
+def test_the_language_of_a_table_without_names_of_signs_falls_back_to_english():
+    assert write("😂", "sah.utb").text.strip("()[]{} ") in {"face with tears of joy", "u+1f602", "128514"}
+
+
 def test_colours_of_a_terminal_are_left_out():
     log = ReportLog()
     assert write("\x1b[1;31mred\x1b[0m \x1b]0;title\x07plain\x1bM", log=log).text == "red plain"

@@ -19,6 +19,7 @@ from itertools import groupby
 
 from ..errors import UndefinedCharacter
 from .alphabet import Alphabet
+from .names import language_of, local_name
 from .report import ReportLog
 
 __all__ = ["Undefined", "Writable", "extends", "name_of", "writable"]
@@ -223,26 +224,33 @@ def _replaced(
             f"character {position}: the table {','.join(alphabet.tables)} cannot write {name_of(visible)} "
             f"({_codes(visible)}); choose another table, or --undefined name or drop"
         )
-    name = _writable_name(visible, alphabet) if policy is Undefined.NAME else ""
+    name = _writable_name(visible, times, alphabet) if policy is Undefined.NAME else ""
     if not name:
         log.undefined(source, "dropped", "", position, times)
         return ""
-    if times > 1:
-        # Digits alone where the table cannot write the words.
-        name = next(
-            (words for words in (f"{name}, {times} times", f"{name} {times}") if not alphabet.lacks(words)), name
-        )
     opening, closing = alphabet.brackets()
     written = f"{opening}{name}{closing}"
     log.undefined(source, "named", written, position, times)
     return written
 
 
-def _writable_name(visible: str, alphabet: Alphabet) -> str:
-    """The first that the table can write: the name, the code points, their digits."""
-    codes = _codes(visible).lower()
-    numbers = " ".join(str(ord(char)) for char in visible)
-    return next((name for name in (name_of(visible), codes, numbers) if not alphabet.lacks(name)), "")
+def _writable_name(visible: str, times: int, alphabet: Alphabet) -> str:
+    """The first that the table can write: the name in its language, in English, the code points, their digits."""
+    language = language_of(alphabet.tables)
+    local = [local_name(char, language) for char in visible if char not in _JOINERS]
+    names = [", ".join(local)] if all(local) else []
+    names += [name_of(visible), _codes(visible).lower(), " ".join(str(ord(char)) for char in visible)]
+    if times > 1:
+        words = ", {} times" if language == "en" else " × {}"
+        names = [name + count.format(times) for name in names for count in (words, " {}")]
+    return next(filter(None, (_spelled(name, alphabet) for name in names)), "")
+
+
+def _spelled(name: str, alphabet: Alphabet) -> str:
+    """A name as the table can write it, empty when it cannot."""
+    log = ReportLog()
+    forms = [_form(name[start:end], 0, alphabet, log) for start, end in _clusters(name)]
+    return "" if None in forms else "".join(form for form in forms if form)
 
 
 def _codes(characters: str) -> str:
