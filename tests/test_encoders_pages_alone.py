@@ -109,6 +109,7 @@ def test_a_page_that_lost_its_number_sign_is_found_and_named():
     bare = [page._replace(goes_on=tuple(GoesOn(one.run, one.mark) for one in page.goes_on)) for page in bare]
     check = back_check(bare, "call 5550199 now", scene.encoding)
     assert check.cells_equal, "together they are the cells of the text"
+    assert check.sentence.endswith("Pages that read alone say something else: 1.")
     (wrong,) = check.alone
     assert wrong.sentence == "page 3: '199' read alone is 'aii'"
 

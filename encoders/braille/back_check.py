@@ -92,7 +92,13 @@ class BackCheck:
 
     @property
     def sentence(self) -> str:
-        """One sentence for a report."""
+        """A sentence for a report, and a second one where pages read alone say something else."""
+        if not self.alone:
+            return self._together
+        return f"{self._together} Pages that read alone say something else: {self.alone_total}."
+
+    @property
+    def _together(self) -> str:
         if not self.ok:
             return f"The cells are not those of the text ({self.difference_total} differences)."
         if self.text_equal:

@@ -5,20 +5,20 @@ of the dictionary, then between other letters; inside capitals and digits only w
 written by the table as if each stood alone: so the second has its own indicators (a number sign, a sign of capitals),
 the first keeps none that governs the second, and no contraction is cut, in any table, without a rule of any code
 here. Of the places of one kind those come first where nothing but indicators changes; then those where a contraction
-over the place is dissolved, as UEB 10.13.2 and the German code (2.5.1.1) ask at the end of a line.
+over the place is dissolved, as UEB 10.13 and the German code (2.5.1.1) ask at the end of a line.
 
 What ends the first part:
 
 - nothing after a hyphen of the word's own;
-- in a word of letters the table's hyphen: UEB 10.13.1 divides words by it and keeps the line continuation indicator
-  for other matter (so also NBA's answer at nationalbraille.org/forums/reply/38183), as does the German code (2.5.1.1,
-  rw-blindenschrift.de/124/menu-rw-kap-2/menu-rw-kap-2-5.html);
+- in a word of letters the table's hyphen: UEB 10.13 (uebot.niu.edu has the rules) divides words by it and keeps the
+  line continuation indicator for other matter (so also NBA's answer at nationalbraille.org/forums/reply/38183), as does
+  the German code (2.5.1.1, rw-blindenschrift.de/124/menu-rw-kap-2/menu-rw-kap-2-5.html);
 - in any other word, where a hyphen would be taken for the word's own, the code's sign of continuation: dot 5 in UEB
   (its line continuation indicator), dot 4 in German (braille.ch/urls-usw.htm). For other codes no rule was found:
   there nothing is added, and the indicators alone are restated.
 
-UEB and the Marburg mathematics do not restate the number sign after these signs; here it is, since a page may be read
-alone (German: after a division the number sign is written again, fakoo.de/braille-zahlen.html).
+The number sign is restated in every code, since a page may be read alone (German asks for it after a division anyway:
+fakoo.de/braille-zahlen.html).
 """
 
 from __future__ import annotations
