@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
-from encoders import back_check, covered_text, read_cells
+from encoders import FeltPage, back_check, covered_text, read_cells
 
 from .progress import progress
 from .reports.text import AMPLITUDE_ERROR_LIMIT, DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
@@ -212,11 +212,12 @@ def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
     """Read the felt dots of each page as cells, and translate them back."""
     encoding = manifest.encoding
     checks: list[FrameCheck] = []
-    pages: list[str] = []
-    for _, parts in groupby(report.frames, key=lambda check: check.page):
+    pages: list[FeltPage] = []
+    marks = {mark.page: mark for mark in manifest.frames}
+    for number, parts in groupby(report.frames, key=lambda check: check.page):
         together = list(parts)
         cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
-        pages.append(cells)
+        pages.append(FeltPage(cells, marks[number].text, marks[number].goes_on))
         checks += [replace(check, felt_cells=cells) for check in together]
     source = covered_text((mark.span, mark.text) for mark in manifest.frames)
     check = back_check(pages, source, encoding)
@@ -227,6 +228,6 @@ def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
         felt_text=check.back,
         text_equal=check.text_equal,
         cells_equal=check.cells_equal,
-        differences=tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences),
+        differences=tuple(one.sentence for one in (*check.differences, *check.alone)),
         notes=(*report.notes, check.sentence),
     )

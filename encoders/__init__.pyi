@@ -1,6 +1,7 @@
 from .braille.back_check import (
     BackCheck as BackCheck,
     Difference as Difference,
+    FeltPage as FeltPage,
     back_check as back_check,
     back_translate as back_translate,
     covered_text as covered_text,
@@ -13,7 +14,7 @@ from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,
 )
-from .braille.layout import (
+from .braille.joining import (
     join_pages as join_pages,
 )
 from .braille.louis_binding import (
@@ -97,6 +98,7 @@ from .picture.similarity import (
 )
 from .scene import (
     Frame as Frame,
+    GoesOn as GoesOn,
     GridShape as GridShape,
     PatternKind as PatternKind,
     Scene as Scene,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Frame", "GridShape", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
+__all__ = ["Frame", "GoesOn", "GridShape", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,26 @@ class TargetPattern:
 
 
 @dataclass(frozen=True, slots=True)
+class GoesOn:
+    """A word that goes on after a run (see `encoders.braille.layout`), and what is not of the word there.
+
+    Attributes
+    ----------
+    run : number of the run on the page, from 0.
+    mark : cells that end the run and say that the word goes on, such as a hyphen.
+    restated : cells at the start of the next run that the word has not there: its indicators once more.
+    ending : cells before the mark that the word has not there, as it is written at the end of a word.
+    left_out : cells of the word that stand in neither run, such as a contraction over the place.
+    """
+
+    run: int
+    mark: str = ""
+    restated: str = ""
+    ending: str = ""
+    left_out: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A pattern and how long it is shown.
 
@@ -77,6 +97,7 @@ class Frame:
     page : which page it belongs to; the parts of one page (`by-row`, `by-dot`) are superposed by a reader.
     text : the span of source text it shows; `span` is its (start, end) in characters.
     cells : the page's cells as Unicode Braille, lines separated by a newline; empty when blank.
+    goes_on : where words go on after a run of the page.
     """
 
     pattern: TargetPattern
@@ -85,6 +106,7 @@ class Frame:
     text: str = ""
     span: tuple[int, int] = (0, 0)
     cells: str = ""
+    goes_on: tuple[GoesOn, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)

@@ -31,7 +31,7 @@ def text_findings(scene: TextScene) -> TextFindings:
         undefined=_undefined(encoded),
         split=tuple(
             f"{split.word!r} at character {split.span[0]}, page {split.page + 1}, "
-            + ("hyphenated" if split.hyphenated else "at the last cell")
+            + ("hyphenated" if split.hyphenated else "not at a syllable")
             for split in encoded.splits
         ),
         differences=differences,
@@ -52,4 +52,4 @@ def _back_check(frames: TextFrames) -> tuple[tuple[str, ...], str]:
     if len(frames.source.text) > MOST_CHECKED:
         return (), f"A text of more than {MOST_CHECKED} characters is not translated back here; verify does it."
     check = frames.check()
-    return tuple(f"{one.source!r} comes back as {one.back!r}" for one in check.differences), check.sentence
+    return tuple(one.sentence for one in (*check.differences, *check.alone)), check.sentence

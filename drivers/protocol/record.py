@@ -6,7 +6,7 @@ import json
 import zlib
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ def frame_note(mark: FrameMark) -> bytes:
             "start_s": mark.start_s, "settled_s": mark.settled_s, "end_s": mark.end_s,
             "omega": mark.omega.tolist(), "target": mark.target.tolist(), "cells": mark.cells, "text": mark.text,
             "outcome": mark.outcome.value, "page": mark.page, "span": list(mark.span),
+            **({"goes_on": [asdict(one) for one in mark.goes_on]} if mark.goes_on else {}),
         }
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, BinaryIO
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
+from encoders import GoesOn
 from planner import FramePlan, OperatingPoint
 
 from ..channels import Channel, channels_of
@@ -54,6 +55,7 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
+    goes_on : where words of the page go on, and which cells are not of the word there.
     """
 
     start_s: float
@@ -69,6 +71,7 @@ class FrameMark:
     tones: tuple[tuple[float, ...], ...]
     phase: Floats
     moving: tuple[bool, ...]
+    goes_on: tuple[GoesOn, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -275,6 +278,8 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         "page": frame.frame.page,
         "span": list(frame.frame.span),
     }
+    if frame.frame.goes_on:
+        mark["goes_on"] = [asdict(one) for one in frame.frame.goes_on]
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chainsim import Device, Outcome, complaint_of, shown, words_of
+from encoders import GoesOn
 
 from ..channels import Channel, Role
 from ..errors import UnreadableWaveform
@@ -52,6 +53,14 @@ class _Event(_Part):
     ramp_s: Seconds
 
 
+class _GoesOn(_Part):
+    run: Index
+    mark: Words = ""
+    restated: Words = ""
+    ending: Words = ""
+    left_out: Words = ""
+
+
 class _Frame(_Part):
     start_s: Seconds
     settled_s: Seconds
@@ -66,6 +75,7 @@ class _Frame(_Part):
     tones: list[list[Positive]] | None = None
     phase: list[list[Finite | None]] | None = None
     moving: list[bool] | None = None
+    goes_on: list[_GoesOn] = []
 
 
 class _File(_Part):
@@ -229,6 +239,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
         phase=_frozen(phase),
         moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
+        goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
     )
 
 

@@ -45,6 +45,15 @@ class Alphabet:
             return True
         return not sure and not louis_binding.translate_string(self.tables, char, undefined=True)
 
+    def spells(self, cluster: str) -> bool:
+        """Whether these characters together can be written, though one of them alone cannot: a letter and its mark."""
+        known = self._written.get(cluster)
+        if known is None:
+            sure = louis_binding.translate_string(self.tables, cluster, undefined=False)
+            written = louis_binding.translate_string(self.tables, cluster, undefined=True)
+            known = self._written[cluster] = bool(sure.strip(BLANK)) and sure == written
+        return known
+
     def dots(self, char: str) -> int:
         """8 when the sign of this character uses dot 7 or 8, else 6."""
         cells = louis_binding.translate_string(self.tables, char, undefined=False)

@@ -1,28 +1,32 @@
 """Does the Braille that is felt say the text again? Back-translation, and what it can be held to.
 
 Not every table can be undone: some are declared for one direction (contracted German), Chinese tables
-write sounds. So three things are looked at, and named apart in the answer.
+write sounds. So three things are looked at, and named apart in the answer. All of them are of the pages together;
+beside that each page is read alone, with nothing known of the page before it.
 """
 
 from __future__ import annotations
 
+import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 from ..errors import TableMissing
+from ..scene import GoesOn
 from . import louis_binding
 from .alphabet import alphabet
 from .choices import Undefined
 from .dots import BLANK, LOWER_SIX
-from .layout import join_pages
+from .joining import join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
 from .transcribe import Transcriber, translate
 from .undefined import writable
 
-__all__ = ["BackCheck", "Difference", "back_check", "back_translate", "covered_text"]
+__all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate", "covered_text"]
 
 PIECE = 2000
 """Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
@@ -33,10 +37,29 @@ REACH = 12
 
 @dataclass(frozen=True)
 class Difference:
-    """Words of the source and what the back-translation has for them; one of them may be empty."""
+    """Words of the source and what the back-translation has for them; one of them may be empty.
+
+    `page` is the number of the page, from 0, that reads so alone; None of a difference in the text as a whole.
+    """
 
     source: str
     back: str
+    page: int | None = None
+
+    @property
+    def sentence(self) -> str:
+        """For a person, pages counted from 1."""
+        if self.page is None:
+            return f"{self.source!r} comes back as {self.back!r}"
+        return f"page {self.page + 1}: {self.source!r} read alone is {self.back!r}"
+
+
+class FeltPage(NamedTuple):
+    """Cells of a page as `read_cells` gives them, the source text they show, and where words go on."""
+
+    cells: str
+    text: str = ""
+    goes_on: tuple[GoesOn, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,6 +74,7 @@ class BackCheck:
     cells_equal : the joined cells are exactly what the table writes for the text.
     back : the back-translated text.
     differences : the first 100 between source and back-translation; `difference_total` counts all.
+    alone : the first 100 pages that read alone are not what they show; `alone_total` counts all.
     """
 
     text_equal: bool
@@ -59,6 +83,8 @@ class BackCheck:
     back: str
     differences: tuple[Difference, ...]
     difference_total: int
+    alone: tuple[Difference, ...] = ()
+    alone_total: int = 0
 
     @property
     def ok(self) -> bool:
@@ -67,7 +93,13 @@ class BackCheck:
 
     @property
     def sentence(self) -> str:
-        """One sentence for a report."""
+        """A sentence for a report, and a second one where pages read alone say something else."""
+        if not self.alone:
+            return self._together
+        return f"{self._together} Pages that read alone say something else: {self.alone_total}."
+
+    @property
+    def _together(self) -> str:
         if not self.ok:
             return f"The cells are not those of the text ({self.difference_total} differences)."
         if self.text_equal:
@@ -103,37 +135,99 @@ def back_translate(tables: tuple[str, ...], cells: str) -> str:
     return "".join(parts)
 
 
-def back_check(pages: Iterable[str], text: str, encoding: Mapping[str, Any]) -> BackCheck:
-    """Compare what pages of felt cells say with `text`.
+def back_check(pages: Iterable[FeltPage | str], text: str, encoding: Mapping[str, Any]) -> BackCheck:
+    """Compare what pages of felt cells say with `text`, together and each alone.
 
     Parameters
     ----------
-    pages : cells of each page, as `read_cells` gives them.
+    pages : each page, or its cells only, as `read_cells` gives them; such are not read alone.
     text : the source the pages show; for Braille sources the cells themselves.
     encoding : of the scene.
     """
-    joined = join_pages(pages, encoding)
-    tables, dots = tuple(encoding["tables"]), int(encoding["dots"])
-    transcriber = Transcriber(tables, Undefined(encoding["undefined"]), dots)
+    given = list(pages)
+    noted = "continuation" in encoding and not any(isinstance(page, str) for page in given)
+    felt = [FeltPage(page) if isinstance(page, str) else page for page in given]
+    joined = join_pages((page.cells for page in felt), encoding, (page.goes_on for page in felt) if noted else None)
+    reading = _Reading(encoding)
     source = TextSource(text, SourceKind(encoding["kind"]), "text")
-    words = (word for a, b in transcriber.paragraphs(source) for word in transcriber.words(source, a, b, ReportLog()))
-    expected = _joined_cells(words)
+    expected = reading.written(source)
     if source.kind is SourceKind.BRAILLE:
         same = joined == expected
         found = () if same else tuple(_differences(expected.split(BLANK), joined.split(BLANK)))
         return BackCheck(same, same, same, joined, found[:KEPT], len(found))
-    ready = writable(text, 0, alphabet(tables), transcriber.undefined, ReportLog()).text
+    tables = reading.tables
+    ready = writable(text, 0, alphabet(tables), reading.transcriber.undefined, ReportLog()).text
     back = back_translate(tables, joined)
     found = tuple(_differences(_folded(ready).split(), _folded(back).split()))
     text_equal = not found or "".join(_folded(ready).split()) == "".join(_folded(back).split())
+    alone = tuple(reading.alone(felt, encoding))
     return BackCheck(
         text_equal=text_equal,
-        again_equal=text_equal or _squeezed(tables, back, dots) == joined.replace(BLANK, ""),
+        again_equal=text_equal or _squeezed(tables, back, reading.transcriber.dots) == joined.replace(BLANK, ""),
         cells_equal=joined == expected,
         back=back,
         differences=() if text_equal else found[:KEPT],
         difference_total=0 if text_equal else len(found),
+        alone=alone[:KEPT],
+        alone_total=len(alone),
     )
+
+
+class _Reading:
+    """Writes and reads with the table of a scene; equal pages once."""
+
+    def __init__(self, encoding: Mapping[str, Any]) -> None:
+        self.tables = tuple(encoding["tables"])
+        policy, passages = Undefined(encoding["undefined"]), bool(encoding.get("passages", True))
+        self.transcriber = Transcriber(self.tables, policy, int(encoding["dots"]), passages)
+        self._reads_as = lru_cache(maxsize=1 << 12)(self._asked)
+
+    def written(self, source: TextSource, log: ReportLog | None = None) -> str:
+        """Cells of a source, words parted by one blank."""
+        log = log or ReportLog()
+        paragraphs = self.transcriber.paragraphs(source)
+        return _joined_cells(word for a, b in paragraphs for word in self.transcriber.words(source, a, b, log))
+
+    def alone(self, pages: Iterable[FeltPage], encoding: Mapping[str, Any]) -> Iterator[Difference]:
+        """Pages that do not say what they show when nothing else is read.
+
+        Of words that are whole on their page only digits and capitals are looked at, what indicators of a page before
+        could change: the letters of such words are those of the text already if all pages together are.
+        """
+        begun = False
+        for number, page in enumerate(pages):
+            text, goes_on = page.text.strip(), bool(page.goes_on)
+            back = self._reads_as(unmarked(page.cells, encoding, page.goes_on), text, begun, goes_on) if text else text
+            begun = goes_on
+            if back != text:
+                yield Difference(text, back, number)
+
+    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool) -> str:
+        """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""
+        log = ReportLog()
+        written = self.written(TextSource(text, SourceKind.TEXT, "page"), log)
+        # The name of a character may be spread over pages that all show the one character.
+        if cells == written or log.undefined_total:
+            return text
+        words = cells.split(BLANK)
+        parts = (not begun or written.startswith(words[0])) and (not goes_on or written.endswith(words[-1]))
+        if parts and not _indicated(text):
+            return text
+        back, likely = back_translate(self.tables, cells), back_translate(self.tables, written)
+        look: Callable[[str], str] = _indicated if parts else _letters
+        return text if look(back) in (look(text), look(likely)) else back
+
+
+def _letters(text: str) -> str:
+    return "".join(_folded(text).split())
+
+
+def _indicated(text: str) -> str:
+    return "".join(char for char in _UNREAD.sub("", text) if char.isdigit() or char.isupper())
+
+
+# Cells the table does not read, as the library shows them: their dots.
+_UNREAD = re.compile(r"\\[\d/-]+/")
 
 
 def _joined_cells(words: Iterable[Any]) -> str:

@@ -85,14 +85,14 @@ class ReportLog:
     _undefined: dict[tuple[str, str], UndefinedUse] = field(default_factory=dict)
     _splits: list[Split] = field(default_factory=list)
 
-    def undefined(self, characters: str, action: str, written: str, position: int) -> None:
-        """Note one use of characters the table cannot write."""
-        self.undefined_total += 1
+    def undefined(self, characters: str, action: str, written: str, position: int, times: int = 1) -> None:
+        """Note uses of characters the table cannot write, `times` of them side by side."""
+        self.undefined_total += times
         old = self._undefined.get((characters, action))
         if old is not None:
-            use = UndefinedUse(characters, action, old.written, old.first, old.count + 1)
+            use = UndefinedUse(characters, action, old.written, old.first, old.count + times)
         elif len(self._undefined) < KEPT:
-            use = UndefinedUse(characters, action, written, position, 1)
+            use = UndefinedUse(characters, action, written, position, times)
         else:
             return
         self._undefined[characters, action] = use

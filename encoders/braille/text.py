@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import unicodedata
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -13,10 +16,10 @@ from ..errors import EmptyText, LayoutError
 from ..scene import Frame, GridShape, Scene, TargetPattern
 from . import louis_binding
 from .alphabet import alphabet
-from .back_check import BackCheck, back_check
+from .back_check import BackCheck, FeltPage, back_check
 from .choices import Presentation, Undefined
 from .dots import BLANK, HIGHEST_6_DOT
-from .layout import Layout, PlacedWord, paginate
+from .layout import Cut, Layout, PlacedWord, cut_anywhere, paginate
 from .presentation import MIN_PART_S, presenter, read_cells
 from .readers.sources import SourceKind, TextSource
 from .report import EncodingReport, ReportLog, Split
@@ -27,6 +30,8 @@ from .undefined import writable
 __all__ = ["TextFrames", "TextOptions", "TextScene", "encode_text"]
 
 DEFAULT_RATE = 6.0
+ROOM_FOR_SIGNS = 4
+"""Cells of a run that has room for an indicator, what it governs and a hyphen."""
 SHORT_PAGE_S = 1.0
 """A page with few cells lasts as long as it would with more, up to this."""
 MOST_KEPT = 1 << 18
@@ -91,8 +96,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
     """The scene that shows `source` on a grid.
 
     Frames are made while they are consumed, in memory that does not grow with the text. ``encoding`` holds
-    what a reader of the dots needs: kind, tables, dots, cell_gap, line_gap, lines, cells_per_line, run and
-    hyphen (see `encoders.layout`), presentation, undefined, liblouis (its version).
+    what a reader of the dots needs: kind, tables, dots, cell_gap, line_gap, lines, cells_per_line, run,
+    hyphen and continuation (see `encoders.braille.layout`), passages, presentation, undefined, liblouis (its version).
 
     Raises
     ------
@@ -112,11 +117,11 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
             raise LayoutError(f"{name}: expected a number > 0, got {value}")
     tables = resolve_tables(options.table)
     dots = _dots(source, tables, shape, options)
-    transcriber = Transcriber(tables, options.undefined, dots)
-    _refuse_unwritable(source, transcriber)
     layout = Layout(shape, 3 if dots == 6 else 4, options.cell_gap, options.line_gap)
-    if source.kind is SourceKind.TEXT and layout.run >= 4:
-        layout = Layout(shape, layout.height, options.cell_gap, options.line_gap, transcriber.hyphen())
+    transcriber = Transcriber(tables, options.undefined, dots, passages=layout.run < layout.capacity)
+    _refuse_unwritable(source, transcriber)
+    if source.kind is SourceKind.TEXT and layout.run >= ROOM_FOR_SIGNS:
+        layout = replace(layout, hyphen=transcriber.hyphen(), continuation=transcriber.continuation())
     encoding = {
         "kind": source.kind.value,
         "tables": list(tables),
@@ -127,6 +132,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
         "cells_per_line": layout.cells_per_line,
         "run": layout.run,
         "hyphen": layout.hyphen,
+        "continuation": layout.continuation,
+        "passages": transcriber.passages,
         "presentation": options.presentation.value,
         "undefined": options.undefined.value,
         "liblouis": louis_binding.liblouis_version(),
@@ -144,8 +151,7 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
         eight, what = max(source.text) > HIGHEST_6_DOT, f"{source.name} holds 8-dot cells"
     else:
         stated = table_dots(tables)
-        letters = (char for char in sorted(set(source.text)) if char.isalnum())
-        eight = stated == 8 or (not stated and any(alphabet(tables).dots(char) == 8 for char in letters))
+        eight = stated == 8 or (not stated and _own_letters_eight(source.text, tables))
         what = f"table {','.join(tables)} writes 8-dot cells"
     if not eight:
         return 6
@@ -155,6 +161,20 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
             "or give --dots 6 (dots 7 and 8 are left out)"
         )
     return 8
+
+
+def _own_letters_eight(text: str, tables: tuple[str, ...]) -> bool:
+    """Whether letters of the text's own script have 8-dot signs; words of another are written with six."""
+    letters = Counter({char: count for char, count in Counter(text).items() if char.isalnum()})
+    scripts = Counter[str]()
+    for char, count in letters.items():
+        scripts[_script(char)] += count
+    own = max(scripts, key=scripts.__getitem__, default="")
+    return any(alphabet(tables).dots(char) == 8 for char in sorted(letters) if _script(char) == own)
+
+
+def _script(char: str) -> str:
+    return unicodedata.name(char, "").partition(" ")[0]
 
 
 def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
@@ -224,7 +244,7 @@ class TextFrames:
         self._log = log = ReportLog()
         text, show = self.source.text, self._show
         between = False
-        for page in paginate(self._words(log), self.layout, self._breaks, self._note):
+        for page in paginate(self._words(log), self.layout, self._cut, self._note):
             if between:
                 yield self._blank_frame(log, page.start)
             shown = show(page.cells)
@@ -234,7 +254,7 @@ class TextFrames:
             gap = PARAGRAPH_END.match(text, page.end) if page.end_of_paragraph else None
             span = (page.start, gap.end() if gap else page.end)
             for pattern in shown.parts:
-                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells)
+                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells, page.goes_on)
             log.frames += len(shown.parts)
             log.cells += len(page.cells) - page.cells.count(BLANK)
             log.pages += 1
@@ -251,31 +271,26 @@ class TextFrames:
     def _words(self, log: ReportLog) -> Iterator[PlacedWord]:
         for start, end in self._transcriber.paragraphs(self.source):
             yield from self._transcriber.words(self.source, start, end, log)
-            yield PlacedWord("", end, end, (), 0, 0, False)
+            yield PlacedWord("", "", end, end, None, 0, 0, False)
 
-    def _breaks(self, word: PlacedWord) -> list[int]:
-        return self._transcriber.breaks(self.source, word) if self.layout.hyphen else []
+    def _cut(self, word: PlacedWord, room: int) -> Cut:
+        if self.source.kind is SourceKind.BRAILLE:
+            return cut_anywhere(word, room)
+        return self._transcriber.cut(word, room, self.layout.hyphen, self.layout.continuation)
 
-    def _note(self, word: PlacedWord, _cut: int, hyphenated: bool) -> None:
+    def _note(self, word: PlacedWord, cut: Cut) -> None:
         start = self.source.text[word.start : min(word.end, word.start + 80)]
-        self._log.split(Split(start, (word.start, word.end), self._log.pages, hyphenated))
+        self._log.split(Split(start, (word.start, word.end), self._log.pages, cut.hyphenated))
 
     def check(self) -> BackCheck:
-        """Read all frames as fingers would, back-translate, and compare with the source.
+        """Read all frames as fingers would, back-translate, and compare with the source: together, and page by page.
 
         Holds the whole text and its cells at once; for the frames of a book use it on a part. What the frames of a
         text that is not long were encoded for before serves here too.
         """
-        pages: list[str] = []
-        felt: np.ndarray[Any, np.dtype[np.bool_]] | None = None
-        number = -1
-        for frame in self:
-            dots = np.abs(frame.pattern.amplitude) > 0.5
-            if frame.page != number and felt is not None:
-                pages.append(read_cells(felt, self._encoding))
-                felt = None
-            number = frame.page
-            felt = dots if felt is None else felt | dots
-        if felt is not None:
-            pages.append(read_cells(felt, self._encoding))
+        pages: list[FeltPage] = []
+        for _, group in groupby(self, key=lambda frame: frame.page):
+            parts = list(group)
+            dots = np.any([np.abs(part.pattern.amplitude) > 0.5 for part in parts], axis=0)
+            pages.append(FeltPage(read_cells(dots, self._encoding), parts[0].text, parts[0].goes_on))
         return back_check(pages, self.source.text, self._encoding)

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from ..errors import TableMissing
 from . import louis_binding
 from .alphabet import alphabet
 from .choices import Undefined
+from .cuts import Cutter, continuation_sign
 from .dots import BLANK, HIGHEST_6_DOT, LOWER_SIX
-from .layout import PlacedWord
+from .layout import Cut, PlacedWord, cut_anywhere
 from .readers.sources import SourceKind, TextSource
 from .report import ReportLog
 from .tables import hyphenation_tables
-from .undefined import ZERO_WIDTH_JOINER, extends, writable
+from .undefined import ZERO_WIDTH_JOINER, Writable, extends, writable
 
 __all__ = ["PARAGRAPH_END", "Transcriber", "Translation", "translate"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
-LONGEST_HYPHENATED = 100
 PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
+_WORD = re.compile(r"\S+")
+_ARROWS = "\u2190"
+_NO_ARROWS = "\u2190"
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
@@ -112,12 +115,14 @@ class Transcriber:
     tables : as `resolve_tables` gives them.
     undefined : policy.
     dots : 6 leaves dots 7 and 8 out, 8 keeps them.
+    passages : whether capitals of several words may be marked once for all; without, each page can be read alone.
     """
 
-    def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int) -> None:
+    def __init__(self, tables: tuple[str, ...], undefined: Undefined, dots: int, passages: bool = True) -> None:
         self.tables = tables
         self.undefined = undefined
         self.dots = dots
+        self.passages = passages
 
     def paragraphs(self, source: TextSource) -> Iterator[tuple[int, int]]:
         """(start, end) of each paragraph: parted by an empty line or a form feed."""
@@ -134,32 +139,48 @@ class Transcriber:
         text = source.text
         held: PlacedWord | None = None
         for base, stop, glued in _pieces(text, start, end):
-            cells, origin = self._piece(source, base, stop, log)
-            at = 0
+            cells, origin, ready = self._piece(source, base, stop, log)
+            at = done = 0
             for word in cells.split(BLANK):
                 if word:
-                    first = base + origin[at]
+                    here, done = _said(ready.text, origin, at, at + len(word), done)
+                    first = base + (here if ready.origins is None else ready.origins[here])
                     if held is not None:
-                        yield held._replace(end=_end(text, held.start, first))
-                    held = PlacedWord(word, first, first, origin, at, base, glued and at == 0 and held is not None)
+                        # The name of one character may be several words, which all show it.
+                        shown = max(first, held.source(max(len(held.text) - 1, 0)) + 1)
+                        yield held._replace(end=_end(text, held.start, shown))
+                    said = ready.text[here : max(done, here + 1)].rstrip()
+                    joined = glued and at == 0 and held is not None
+                    held = PlacedWord(word, said, first, first, ready.origins, here, base, joined)
                 at += len(word) + 1
         if held is not None:
             yield held._replace(end=_end(text, held.start, end))
 
-    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int]]:
+    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int], Writable]:
         chunk = source.text[start:stop]
         if source.kind is SourceKind.BRAILLE:
+            ready = Writable(chunk, None)
             cells, origin = _SPACE.sub(BLANK, chunk), list(range(len(chunk)))
         else:
             ready = writable(chunk, start, alphabet(self.tables), self.undefined, log)
-            cells, origin, _ = _translated(self.tables, ready.text)
-            if ready.origins is not None:
-                origin = [ready.origins[position] for position in origin]
+            cells, origin = self._written(ready.text)
         if self.dots == 6 and max(cells, default="") > HIGHEST_6_DOT:
             for at, cell in enumerate(cells):
                 if cell > HIGHEST_6_DOT:
-                    log.undefined(chunk[origin[at]], "six dots", cell.translate(LOWER_SIX), start + origin[at])
-            cells = cells.translate(LOWER_SIX)
+                    place = origin[at] if ready.origins is None else ready.origins[origin[at]]
+                    log.undefined(chunk[place], "six dots", _six_dots(cell), start + place)
+            origin = [
+                position for position, cell in zip(origin, cells, strict=True) if cell == BLANK or _six_dots(cell)
+            ]
+            cells = _six_dots(cells)
+        return cells, origin, ready
+
+    def _written(self, text: str) -> tuple[str, list[int]]:
+        cells, origin = "", list[int]()
+        for start, stop in [(0, len(text))] if self.passages else _apart(self.tables, text):
+            some, back, _ = _translated(self.tables, text[start:stop])
+            cells += some
+            origin += [start + position for position in back] if start else back
         return cells, origin
 
     def hyphen(self) -> str:
@@ -168,21 +189,93 @@ class Transcriber:
             return ""
         return louis_binding.translate_string(self.tables, "-", undefined=True).translate(LOWER_SIX)
 
-    def breaks(self, source: TextSource, word: PlacedWord) -> list[int]:
-        """Cells of `word` before which it may be hyphenated; none inside a contraction."""
-        together = hyphenation_tables(self.tables)
-        text = source.text[word.start : word.end]
-        if not together or len(text) > LONGEST_HYPHENATED:
-            return []
-        first_cell: dict[int, int] = {}
-        for cell in range(len(word.cells)):
-            first_cell.setdefault(word.base + word.origin[word.at + cell] - word.start, cell)
-        return [first_cell[at] for at in _points(together, text) if first_cell.get(at, 0) > 0]
+    def continuation(self) -> str:
+        """The sign the code has for words that go on and are not of letters, empty when it has none."""
+        return continuation_sign(self.tables)
+
+    def cut(self, word: PlacedWord, room: int, hyphen: str, continuation: str) -> Cut:
+        """Where a word of text is cut that has more cells than `room`; see `encoders.braille.cuts`."""
+        if not word.text:
+            return cut_anywhere(word, room)
+        return _cutter(self.tables, self.dots, hyphen, continuation).cut(
+            word.text, word.cells, room, word.kept, word.lettered
+        )
+
+
+def _six_dots(cells: str) -> str:
+    """Cells without dots 7 and 8; one that had no other dots is left out, as a blank there would end the word."""
+    return cells.translate(_ONLY_LOWER).translate(LOWER_SIX)
+
+
+_ONLY_LOWER = dict.fromkeys((0x2840, 0x2880, 0x28C0))
+
+
+@lru_cache(maxsize=16)
+def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) -> Cutter:
+    together = hyphenation_tables(tables) if hyphen else ()
+
+    @lru_cache(maxsize=1 << 14)
+    def write(text: str) -> str:
+        cells, _, _ = _translated(tables, text)
+        cells = cells.strip(BLANK)
+        return _six_dots(cells) if dots == 6 else cells
+
+    @lru_cache(maxsize=1 << 12)
+    def read(cells: str) -> str:
+        try:
+            return louis_binding.back_translate(tables, cells)
+        except RuntimeError:
+            return "\0"  # two parts then never read as the whole
+
+    return Cutter(write, read, lambda word: _points(together, word) if together else [], hyphen, continuation)
 
 
 @lru_cache(maxsize=4096)
 def _points(tables: tuple[str, ...], word: str) -> list[int]:
     return louis_binding.hyphenate(tables, word)
+
+
+def _said(text: str, origin: list[int], at: int, stop: int, done: int) -> tuple[int, int]:
+    """(start, end) in `text` of the word whose cells are ``at:stop``, after one that ended at `done`."""
+    # The first cell of a letter with its accent may come from the second of its characters; a blank need not come
+    # from a space.
+    after_space = done and text[done : done + 1].isspace()
+    start = origin[at] - len(text[done : origin[at]].lstrip()) if after_space or not done else origin[at]
+    if stop < len(origin) and not text[origin[stop]].isspace():
+        stop += 1
+    return start, origin[stop] if stop < len(origin) else len(text)
+
+
+def _apart(tables: tuple[str, ...], text: str) -> Iterator[tuple[int, int]]:
+    """(start, end) of parts, so that no two words that one indicator would stand for are in one."""
+    start, before = 0, frozenset[str]()
+    kinds = _passages(tables)
+    if any(_MARKED[kind](text) for kind in kinds):
+        for match in _WORD.finditer(text):
+            marked = frozenset(kind for kind in kinds if _MARKED[kind](match[0]))
+            if marked & before:
+                yield start, match.start()
+                start = match.start()
+            # A word without letters, such as a number, does not end a passage.
+            before = marked | before if not any(char.isalpha() for char in match[0]) else marked
+    yield start, len(text)
+
+
+_MARKED: dict[str, Callable[[str], object]] = {
+    "AB": lambda text: not text.islower() and any(word.isupper() for word in text.split()),
+    "ab": re.compile("[A-Za-z]").search,
+}
+"""For each sort of words an example, and what tells that there are such in a text."""
+
+
+@cache
+def _passages(tables: tuple[str, ...]) -> tuple[str, ...]:
+    """Sorts of words that the tables mark once where several of them follow."""
+
+    def written(text: str) -> str:
+        return _translated(tables, text)[0]
+
+    return tuple(kind for kind in _MARKED if written(" ".join([kind] * 4)) != BLANK.join([written(kind)] * 4))
 
 
 def _end(text: str, start: int, following: int) -> int:
@@ -209,9 +302,10 @@ def _pieces(text: str, start: int, end: int) -> Iterator[tuple[int, int, bool]]:
             spaces = [match.start() for match in _SPACE.finditer(text, start + 1, window)]
             cut = spaces[-1] if spaces else _hard_cut(text, start, min(window, (start + end) // 2 + 1))
         yield start, cut, glued
-        glued = not (text[cut].isspace() or text[cut - 1].isspace())
+        glued = cut < end and not (text[cut].isspace() or text[cut - 1].isspace())
         start = cut
-    yield start, end, glued
+    if start < end:
+        yield start, end, glued
 
 
 def _hard_cut(text: str, start: int, cut: int) -> int:
@@ -223,4 +317,7 @@ def _hard_cut(text: str, start: int, cut: int) -> int:
     while back - flags > start and "\U0001f1e6" <= text[back - flags - 1] <= "\U0001f1ff":
         flags += 1
     back -= flags % 2
-    return back if back > start else cut
+    back = back if back > start else cut
+    while back < len(text) and text[back] == text[back - 1] and text[back] > _ARROWS and not text[back].isalnum():
+        back += 1  # equal signs are counted together, see `undefined`
+    return back

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from encoders import Undefined, UndefinedCharacter, back_translate, translate
+from encoders import GridShape, TextOptions, Undefined, UndefinedCharacter, back_translate, encode_text, translate
 from encoders.braille.alphabet import alphabet
 from encoders.braille.report import ReportLog
 from encoders.braille.undefined import name_of, writable
@@ -119,6 +119,102 @@ def test_compatible_forms_are_written_and_reported():
     assert write("ﬁn", "fr-bfu-g2.ctb", log=log).text == "fin"
     (use,) = log.report.undefined
     assert (use.characters, use.action, use.written, use.first) == ("ﬁ", "respelled", "fi", 0)
+
+
+@pytest.mark.parametrize(
+    ("table", "typed"),
+    [
+        ("ar-ar-g1.utb", "السّ\u064eلامُ عَلَيْكُمْ يَا مُحَمّ\u064eد"),
+        ("ar-ar-g1.utb", "م\u0651\u064e"),
+        ("he-IL.utb", "ב\u05bc\u05b0רא\u05e9ית"),
+        ("he-IL.utb", "\ufb2a\u05b8לו\u05b9ם"),
+        ("el.ctb", "τι\u037e ναι\u0387 όχι"),
+        ("pu-in-g1.utb", "\u0a36 \u0a33"),
+        ("pa.tbl", "ਸਖਤ\u0a3c"),
+        ("en-ueb-g2.ctb", "\u2329a\u232a \u212b"),
+    ],
+)
+def test_what_is_typed_is_asked_of_the_table_first(table, typed):
+    log = ReportLog()
+    assert translate((table,), write(typed, table, log=log).text).cells == translate((table,), typed).cells
+    assert log.undefined_total == 0
+
+
+@pytest.mark.parametrize(
+    ("table", "turned", "typed"),
+    [
+        ("ar-ar-g1.utb", "م\u064e\u0651", "م\u0651\u064e"),
+        ("ar-ar-g1.utb", "م\u064b\u0651", "م\u0651\u064b"),
+        ("he-IL.utb", "ב\u05b0\u05bc", "ב\u05bc\u05b0"),
+        ("he-IL.utb", "ש\u05b8\u05bc\u05c1", "\ufb2c\u05b8"),
+        ("he-IL.utb", "ש\u05c2\u05b8", "\ufb2b\u05b8"),
+    ],
+)
+def test_vowels_come_last_as_they_are_typed_also_in_normalised_text(table, turned, typed):
+    assert translate((table,), write(turned, table).text).cells == translate((table,), typed).cells
+    assert encode_text(turned, GridShape(6, 6), TextOptions(table=table)).text_frames.check().cells_equal
+
+
+@pytest.mark.parametrize(
+    ("table", "given", "known"),
+    [
+        ("fr-bfu-g2.ctb", "e\u0301", "é"),
+        ("pu-in-g1.utb", "\u0a38\u0a3c", "\u0a36"),
+        ("el.ctb", ";·", "\u037e\u0387"),
+        ("ar-ar-g1.utb", "\u0627\u0653", "\u0622"),
+    ],
+)
+def test_canonically_equal_text_is_written_as_the_table_knows_it(table, given, known):
+    log = ReportLog()
+    assert translate((table,), write(given, table, log=log).text).cells == translate((table,), known).cells
+    assert log.undefined_total == 0
+
+
+def test_repeats_of_a_named_sign_are_counted():
+    log = ReportLog()
+    assert write("😂" * 50 + "a", log=log).text == "(face with tears of joy, 50 times)a"
+    (use,) = log.report.undefined
+    assert (use.count, use.action) == (50, "named")
+    assert write("x\u0304x\u0304", "hi-in-g1.utb").text == "x(combining macron)" * 2
+
+
+@pytest.mark.parametrize(
+    ("table", "name"),
+    [
+        ("de-g2.ctb", "gesicht mit freudentränen"),
+        ("fr-bfu-g2.ctb", "visage riant aux larmes"),
+        ("ru-litbrl.ctb", "смеется до слез"),
+        ("hi-in-g1.utb", "खुशी के आँसुओं वाला चेहरा"),
+    ],
+)
+def test_signs_are_named_in_the_language_of_the_table(table, name):
+    assert write("😂", table).text.strip("()").casefold() == name
+    assert write("😂😂", table).text.strip("()").casefold() == f"{name} × 2"
+
+
+def test_the_language_of_a_table_without_names_of_signs_falls_back_to_english():
+    assert write("😂", "sah.utb").text.strip("()[]{} ") in {"face with tears of joy", "u+1f602", "128514"}
+
+
+def test_colours_of_a_terminal_are_left_out():
+    log = ReportLog()
+    assert write("\x1b[1;31mred\x1b[0m \x1b]0;title\x07plain\x1bM", log=log).text == "red plain"
+    assert (log.invisible, log.undefined_total) == (4, 0)
+    assert write("\x1b[7mred").text == "red"
+
+
+def test_a_sign_of_dot_8_alone_does_not_split_a_word_of_six_dots():
+    typed, table = "می\u200cخواهم", "fa-ir-g1.utb"
+    assert "⢀" in translate((table,), typed).cells
+    (frame,) = encode_text(typed, GridShape(40, 96), TextOptions(table=table)).frames
+    assert frame.cells.replace("\n", "").strip("⠀") == translate((table,), typed.replace("\u200c", "")).cells
+
+
+def test_one_latin_letter_does_not_refuse_a_persian_text():
+    scene = encode_text("گزینه B درست است", GridShape(6, 6), TextOptions(table="fa-ir-g1.utb"))
+    assert scene.encoding["dots"] == 6
+    assert scene.text_frames.check().cells_equal
+    assert [use.action for use in scene.text_frames.report.undefined] == ["six dots"]
 
 
 def test_a_hebrew_letter_with_its_dot_is_written_by_its_one_character():
