@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, cached_property
+from pathlib import Path
 
 from . import louis_binding
 from .dots import BLANK, HIGHEST_6_DOT
@@ -23,6 +24,14 @@ class Alphabet:
         self.tables = tables
         self._written: dict[str, bool] = {}
         self._good = {" "}
+
+    @cached_property
+    def language(self) -> str:
+        """The language the first table is for, as CLDR calls it: as it states, else as its file is named."""
+        from .names import cldr_language
+
+        stated = (louis_binding.table_info(name, "language") for name in self.tables)
+        return cldr_language(next(filter(None, stated), Path(self.tables[0]).stem))
 
     def lacks(self, characters: str) -> bool:
         """Whether one of `characters` cannot be written."""

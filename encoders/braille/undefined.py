@@ -19,7 +19,6 @@ from itertools import groupby
 from ..errors import UndefinedCharacter
 from .alphabet import Alphabet
 from .choices import Undefined
-from .names import language_of, local_name
 from .report import ReportLog
 
 __all__ = ["Writable", "extends", "name_of", "writable"]
@@ -229,12 +228,13 @@ def _replaced(
 
 def _writable_name(visible: str, times: int, alphabet: Alphabet) -> str:
     """The first that the table can write: the name in its language, in English, the code points, their digits."""
-    language = language_of(alphabet.tables)
-    local = [local_name(char, language) for char in visible if char not in _JOINERS]
+    from .names import local_name
+
+    local = [local_name(char, alphabet.language) for char in visible if char not in _JOINERS]
     names = [", ".join(local)] if all(local) else []
     names += [name_of(visible), _codes(visible).lower(), " ".join(str(ord(char)) for char in visible)]
     if times > 1:
-        words = ", {} times" if language == "en" else " × {}"
+        words = ", {} times" if alphabet.language == "en" else " × {}"
         names = [name + count.format(times) for name in names for count in (words, " {}")]
     return next(filter(None, (_spelled(name, alphabet) for name in names)), "")
 

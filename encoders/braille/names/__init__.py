@@ -10,18 +10,8 @@ import json
 import lzma
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 
-from .. import louis_binding
-
-__all__ = ["cldr_language", "language_of", "local_name"]
-
-
-@cache
-def language_of(tables: tuple[str, ...]) -> str:
-    """The language the first table is for, as CLDR calls it: the one it states, else the one its file is named for."""
-    stated = (louis_binding.table_info(name, "language") for name in tables)
-    return cldr_language(next(filter(None, stated), Path(tables[0]).stem))
+__all__ = ["cldr_language", "local_name"]
 
 
 def cldr_language(tag: str) -> str:

@@ -2,16 +2,16 @@
 
 import json
 
-from dotwave.rendering.text import render_text
-
+from chainsim import load_device
+from dotwave.rendering.render import render
 from dotwave.verification import verify
 from drivers import read_waveform
-from encoders import GoesOn, TextOptions
+from encoders import GoesOn, GridShape, TextOptions, encode_text
 
 
 def rendered(folder, text="call 5550199 now"):
     out = folder / "out.npz"
-    render_text(text, device="paper-6x6", out=out, options=TextOptions(), encoding="float32")
+    render(encode_text(text, GridShape(6, 6), TextOptions()), load_device("paper-6x6"), out)
     return out, folder / "out.json"
 
 
