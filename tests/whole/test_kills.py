@@ -131,7 +131,8 @@ class Harness:
 
     def names(self, folder: Path) -> set[str]:
         """Files of a folder and of those in it, with their paths."""
-        return {str(path.relative_to(folder)) for path in folder.rglob("*") if not path.is_dir()}
+        # Folders may go while they are listed.
+        return {str(Path(at, name).relative_to(folder)) for at, _, files in os.walk(folder) for name in files}
 
     def start(self, folder: Path, command: tuple[str, ...]) -> subprocess.Popen[bytes]:
         """A command, in a session of its own."""

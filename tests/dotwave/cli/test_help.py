@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -103,7 +104,8 @@ def test_each_shell_has_its_script(tmp_path: Path, shell: str) -> None:
     if shell == "bash" and shutil.which("bash"):
         calls = f'COMP_WORDS=(dotwave ver); COMP_CWORD=1; _dotwave_completion {tmp_path}/dotwave; echo "$COMPREPLY"'
         program = tmp_path / "dotwave"
-        program.write_text(f'#!/bin/sh\nPYTHONPATH={ROOT} exec {sys.executable} -m dotwave "$@"\n', encoding="utf-8")
+        start = f"PYTHONPATH={shlex.quote(str(ROOT))} exec {shlex.quote(sys.executable)}"
+        program.write_text(f'#!/bin/sh\n{start} -m dotwave "$@"\n', encoding="utf-8")
         program.chmod(0o755)
         answer = subprocess.run(["bash", "-c", f"{script}\n{calls}"], capture_output=True, text=True, check=True)
         assert answer.stdout == "verify\n"
