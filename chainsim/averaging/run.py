@@ -10,7 +10,7 @@ from ..rung import Start
 from .envelope import EnvelopeError, hilltop
 from .flow import SlowFlow
 from .linear import exponential, inverse, times
-from .steps import Course, Stretch, advance
+from .steps import Course, SlowStretch, advance
 
 __all__ = ["COARSE", "FINE", "LOOK", "ORDER", "Run"]
 
@@ -158,7 +158,7 @@ class Run:
         self.steps[lanes] = np.minimum(needed, np.where(good, most, min(8 * count, most)))
         return lanes[~good]
 
-    def _go(self, lanes: Lanes, count: int, share: tuple[float, float], keep: bool) -> Stretch:
+    def _go(self, lanes: Lanes, count: int, share: tuple[float, float], keep: bool) -> SlowStretch:
         h = self.look / count
         stale = lanes[self._made[lanes] != count]
         if len(stale):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .flow import SlowFlow
 from .linear import exponential, times
 
-__all__ = ["Course", "Steps", "Stretch", "advance"]
+__all__ = ["Course", "SlowStretch", "Steps", "advance"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -98,7 +98,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SlowStretch:
     """One stretch of the way.
 
     Attributes
@@ -115,7 +115,7 @@ class Stretch:
 
 def advance(
     flow: SlowFlow, slow: Complexes, drive: Complexes, course: Course, half: Complexes, h: float, count: int, keep: bool
-) -> Stretch:
+) -> SlowStretch:
     """Take `count` steps of length `h` of Lawson's fourth-order method (SIAM J. Numer. Anal. 4, 1967).
 
     What is left of the motion beside `course` turns and dies by the matrix exponential `half`, of half a step, exactly;
@@ -147,7 +147,7 @@ def advance(
             kept.append(near.amplitude)
         if k % 32 == 31 and not np.isfinite(peak).all(axis=1).any():
             break
-    return Stretch(apart + course.at(count * h), peak, kept)
+    return SlowStretch(apart + course.at(count * h), peak, kept)
 
 
 class _Near:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .effects import Tone
 
-__all__ = ["Lines", "Window"]
+__all__ = ["LineWindow", "Lines"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -58,17 +58,17 @@ class Lines:
         return int(there[0]) if len(there) else None
 
     @property
-    def window(self) -> Window:
+    def window(self) -> LineWindow:
         """Where to sample: a period of one tone, or until the nearest lines of several have drawn apart."""
         if self.index.shape[1] == 1:
-            return Window(2 * np.pi / float(self.omega[0]), SAMPLES, self.omega)
+            return LineWindow(2 * np.pi / float(self.omega[0]), SAMPLES, self.omega)
         spacing = float(np.diff(np.sort(np.concatenate([[0.0], self.omega]))).min())
         length = 2 * np.pi * TURNS / spacing
-        return Window(length, int(np.ceil(length * self.omega.max() / (2 * np.pi) * PER_TURN)), self.omega)
+        return LineWindow(length, int(np.ceil(length * self.omega.max() / (2 * np.pi) * PER_TURN)), self.omega)
 
 
 @dataclass(frozen=True)
-class Window:
+class LineWindow:
     """`count` samples, `length`/`count` apart, the first one such step after the window begins."""
 
     length: float

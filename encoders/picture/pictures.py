@@ -19,7 +19,7 @@ from .fit import Candidate, Window, best_patterns, choose_windows, plain_size, s
 from .limits import PictureLimits
 from .options import Fit, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
-from .regions import TEXTURES, Region, dot_regions, textured
+from .regions import TEXTURES, TexturedRegion, dot_regions, textured
 from .similarity import POINTS, agreement, target_of
 from .steps import background_light, composite, content_box, luminance
 from .views import views
@@ -58,7 +58,7 @@ class FrameReport:
     similarity: float
     candidates: tuple[Candidate, ...]
     figure: Floats
-    regions: tuple[Region, ...] = ()
+    regions: tuple[TexturedRegion, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ def _viewed(steps: list[Step], view: str, windows: list[Window], shape: GridShap
     figure = steps[-1].image
     fitted = best_patterns(figure, windows, shape, options.candidates)
     best = fitted.candidates[0]
-    similarity, regions = best.similarity, tuple[Region, ...]()
+    similarity, regions = best.similarity, tuple[TexturedRegion, ...]()
     if options.output is Output.LEVELS:
         pattern, similarity = _levelled(steps, best.window, shape, options)
     elif options.output is Output.TEXTURE:
@@ -259,7 +259,7 @@ def _tone(steps: list[Step]) -> NDArray[np.float32]:
 
 def _textured(
     steps: list[Step], best: Candidate, shape: GridShape, options: PictureOptions
-) -> tuple[TargetPattern, tuple[Region, ...]]:
+) -> tuple[TargetPattern, tuple[TexturedRegion, ...]]:
     colour = np.ascontiguousarray(np.moveaxis(steps[0].image, 2, 0))
     means = np.stack([_dot_means(sampled(one, [best.window], shape)[0], shape) for one in colour], axis=-1)
     labels = dot_regions(means, best.dots.astype(np.float64), options.regions, options.regions_by is RegionsBy.COLOUR)
@@ -269,7 +269,7 @@ def _textured(
         if mine.any():
             red, green, blue = (float(value) for value in means[mine].mean(axis=0))
             texture = TEXTURES[index - 1] if index else None
-            regions.append(Region((red, green, blue), int(mine.sum()), texture))
+            regions.append(TexturedRegion((red, green, blue), int(mine.sum()), texture))
     waves = any(region.texture and region.texture.kind is PatternKind.SINE for region in regions)
     kind = PatternKind.SINE if waves else PatternKind.BARS
     return TargetPattern(_frozen(textured(labels)), kind, phase_matters=True), tuple(regions)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..scene import PatternKind
 from .steps import luminance
 
-__all__ = ["TEXTURES", "Direction", "Region", "Texture", "dot_regions", "textured"]
+__all__ = ["TEXTURES", "Direction", "Texture", "TexturedRegion", "dot_regions", "textured"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -48,7 +48,7 @@ class Texture:
 
 
 @dataclass(frozen=True)
-class Region:
+class TexturedRegion:
     """A part of a picture and its texture.
 
     Attributes

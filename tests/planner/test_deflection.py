@@ -30,7 +30,7 @@ def altered(*, lam_min: float = 0.0, closure: Closure = Closure.OPEN, volts: flo
 
 
 def force_at_rest(device: Device, z: Floats, bias: Floats) -> Floats:
-    """What is left of the static equations of physics.md section 1; zero at an equilibrium."""
+    """What is left of the static equations of docs/theory.md section 2.4; zero at an equilibrium."""
     before = np.roll(z, 1, axis=-1)
     lam = np.full(6, device.coupling.lam.min)
     if device.coupling.closure is Closure.OPEN:
@@ -107,7 +107,7 @@ def test_a_ring_of_separate_actuators() -> None:
 
 
 def test_a_ring_that_howls_is_not_called_ok() -> None:
-    """Above its critical lam a ring has no rest, whatever the bias (physics.md section 3)."""
+    """Above its critical lam a ring has no rest, whatever the bias (docs/theory.md section 3)."""
     (state,) = Deflection(altered(closure=Closure.RING, lam_min=0.02)).states(np.array([[1.0, 0, 1, 1, 0, 1]]))
     assert state.outcome is not Outcome.OK
 

@@ -38,7 +38,7 @@ def test_the_rate_is_the_one_asked_for(device: Device, rate_hz: float) -> None:
 
 
 def test_a_small_motion_has_the_width_of_the_formula() -> None:
-    """rate = f0 delta tan(pi / 2 width) for equal unit gains (physics.md section 2)."""
+    """rate = f0 delta tan(pi / 2 width) for equal unit gains (docs/theory.md section 2.5)."""
     state = walk(PAPER, level=0.01, rate_hz=PAPER.f0_hz * PAPER.delta * math.tan(math.pi / 6))
     (other,) = [tone for tone in state.tones if not tone.side]
     lags = [-np.angle(phasor[1] / phasor[0]) for phasor in (state.phasor, other.phasor)]

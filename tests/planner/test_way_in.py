@@ -43,7 +43,7 @@ FINE = 300
 
 @cache
 def wave(lag: float, amplitude: float, n: int = 6, beta: float = -1.0) -> tuple[float, OperatingPoint]:
-    """omega and the uniform wave of physics.md section 2, its phasors from harmonic balance."""
+    """omega and the uniform wave of docs/theory.md section 2.2, its phasors from harmonic balance."""
     phi, omega = math.radians(lag), 1.0
     for _ in range(100):
         lam = PAPER.delta * omega / math.sin(phi)
@@ -251,7 +251,7 @@ def test_chains_of_other_lengths_and_kinds(n: int, beta: float) -> None:
 
 
 def test_the_scale_of_z_does_not_matter() -> None:
-    """z -> z / sqrt|beta| takes one chain into the other (physics.md section 1)."""
+    """z -> z / sqrt|beta| takes one chain into the other (docs/theory.md section 1.2)."""
     omega, held = wave(120, 0.07)
     strong = Chain(n=6, delta=PAPER.delta, beta=-1e4)
     small = OperatingPoint(held.epsilon / 100, held.lam, omega, held.phasor / 100)
