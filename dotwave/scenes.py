@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from planner import PlanError
 
 from .request import Request
 
-__all__ = ["DeviceScene", "SceneFrames", "joined", "still_scene", "text_scene"]
+__all__ = ["DeviceScene", "SceneFrames", "joined", "placed", "shape_of", "still_scene", "text_scene"]
 
 LONGEST_WORDS = 40
 
@@ -31,6 +32,22 @@ class DeviceScene(Scene):
     @abstractmethod
     def placed(self, error: PlanError) -> Exception:
         """What the planner refused, with the place in the scene that it was about."""
+
+
+@contextmanager
+def placed(scene: Scene) -> Iterator[None]:
+    """What the planner refuses of `scene` gets its place, where the scene knows one."""
+    try:
+        yield
+    except PlanError as error:
+        if not isinstance(scene, DeviceScene):
+            raise
+        raise scene.placed(error) from None
+
+
+def shape_of(device: Device) -> GridShape:
+    """The grid that scenes for a device are laid out for."""
+    return GridShape(device.rows, device.cols)
 
 
 def text_scene(source: TextSource, shape: GridShape, options: TextOptions) -> TextScene:

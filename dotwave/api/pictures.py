@@ -12,8 +12,8 @@ from encoders import PictureOptions, Scene, Style
 
 from ..errors import AppError
 from ..pictures import picture_scene, pitched
-from ..scenes import joined
-from .scenes import USUAL_DEVICE, AnyDevice, device as _device, shape_of
+from ..scenes import joined, shape_of
+from .scenes import USUAL_DEVICE, AnyDevice, device as _device
 
 __all__ = ["icons", "image"]
 

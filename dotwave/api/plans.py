@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, overload
 from chainsim import Outcome
 from drivers import Encoding, Waveform, channels_of
 from encoders import Scene
-from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, PlanError, plan_scene
+from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
 
 from ..errors import AppError, NotMade
 from ..rendering.render import render
 from ..reports.html import html_table
 from ..reports.report import Report
 from ..request import Request
-from ..scenes import DeviceScene
+from ..scenes import DeviceScene, placed
 from ..studies.judge import Judge
 from .scenes import AnyDevice, device as device_of
 
@@ -287,7 +287,7 @@ class PlanWaveform(Waveform):
         request = replace(self.plan.request, encoding=encoding, actuator=actuator, yes=True)
         report = render(self.plan.scene, self.device, Path(path), request)
         if not report.made:
-            raise NotMade(next(note for note in report.notes if note.startswith("Frame ")))
+            raise NotMade(report.failure)
         return report
 
 
@@ -300,12 +300,8 @@ class _Judged:
     request: Request
 
     def __iter__(self) -> Iterator[FramePlan]:
-        try:
+        with placed(self.scene):
             yield from Judge(self.request).judged(self.plan)
-        except PlanError as error:
-            if not isinstance(self.scene, DeviceScene):
-                raise
-            raise self.scene.placed(error) from None
 
 
 @dataclass(frozen=True)

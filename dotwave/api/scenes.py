@@ -11,19 +11,12 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from chainsim import Device, complaint_of, load_device, words_of
-from encoders import (
-    GridShape,
-    Scene,
-    TargetPattern,
-    TextOptions,
-    TextScene,
-    TextSource,
-)  # fmt: skip
+from encoders import Scene, TargetPattern, TextOptions, TextScene, TextSource
 
 from ..errors import AppError
-from ..scenes import DeviceScene, still_scene, text_scene
+from ..scenes import DeviceScene, shape_of, still_scene, text_scene
 
-__all__ = ["USUAL_DEVICE", "AnyDevice", "device", "job", "shape_of", "text", "texture"]
+__all__ = ["USUAL_DEVICE", "AnyDevice", "device", "job", "text", "texture"]
 
 AnyDevice = Device | str | PathLike[str] | Mapping[str, Any]
 Model = TypeVar("Model", bound=BaseModel)
@@ -188,11 +181,6 @@ def _checked(model: type[Model], given: Mapping[str, Any], what: str) -> Model:
         complaint = complaint_of(error)
         place = ".".join(filter(None, (what, words_of(complaint.place) if complaint.place else "")))
         raise AppError(f"{place}: {complaint.sentence}") from None
-
-
-def shape_of(profile: Device) -> GridShape:
-    """The grid that scenes for a device are laid out for."""
-    return GridShape(profile.rows, profile.cols)
 
 
 def _source(source: str | PathLike[str]) -> TextSource:

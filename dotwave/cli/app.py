@@ -11,7 +11,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from io import TextIOWrapper
@@ -20,6 +20,7 @@ from typing import Annotated, NoReturn
 
 import typer
 from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from encoders import Presentation, Undefined
 
@@ -250,15 +251,22 @@ def application() -> typer.Typer:
 
 def _asked(words: Sequence[str]) -> typer.Typer:
     """No other command than the first of `words`, where that is one: making all takes longer than most take to run."""
-    for parts in (lambda: [app], lambda: [group.typer_instance for group in application().registered_groups]):
-        for info in (info for part in parts() if part is not None for info in part.registered_commands):
-            if words[:1] == [info.name or get_command_name(getattr(info.callback, "__name__", ""))]:
-                only = _without_commands()
-                only.registered_commands.append(info)
-                # Without a function of its own it would be the command itself, not a group of one.
-                only.callback()(lambda: None)
-                return only
+    for info in _commands():
+        if words[:1] == [info.name or get_command_name(getattr(info.callback, "__name__", ""))]:
+            only = _without_commands()
+            only.registered_commands.append(info)
+            # Without a function of its own it would be the command itself, not a group of one.
+            only.callback()(lambda: None)
+            return only
     return application()
+
+
+def _commands() -> Iterator[CommandInfo]:
+    """Those of this file, then of the others, which are imported only when none of the first is asked for."""
+    yield from app.registered_commands
+    for group in application().registered_groups:
+        if group.typer_instance is not None:
+            yield from group.typer_instance.registered_commands
 
 
 def _terminate(number: int, _frame: object) -> NoReturn:

@@ -36,6 +36,7 @@ from planner import PLANS_VERSION, Plan, PlanError, plan_scene
 from ..errors import AppError
 from ..rendering.render import render
 from ..request import Request
+from ..scenes import shape_of
 
 __all__ = [
     "Recipe",
@@ -52,7 +53,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 Record = dict[str, Any]
 
-PACKAGES = ("chainsim", "drivers", "encoders", "planner")
+PACKAGES = ("chainsim", "dotwave", "drivers", "encoders", "planner")
 # Digits kept of a similarity, and of a predicted error in units of full scale.
 DIGITS = 6
 
@@ -66,8 +67,8 @@ def versions() -> str:
 def code_digest() -> str:
     """Digest of the code that does the work: machines that share it must have the same."""
     digest = hashlib.sha256()
-    here = Path(__file__)
-    for path in (here, *(path for one in PACKAGES for path in sorted((here.parents[2] / one).rglob("*.py")))):
+    root = Path(__file__).parents[2]
+    for path in (path for one in PACKAGES for path in sorted((root / one).rglob("*.py"))):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
@@ -94,7 +95,7 @@ class Recipe:
     @property
     def shape(self) -> GridShape:
         """The device's grid."""
-        return GridShape(self.device.rows, self.device.cols)
+        return shape_of(self.device)
 
     @cached_property
     def scope(self) -> str:
@@ -191,7 +192,7 @@ def _written(recipe: Recipe, task: Task) -> Record:
         except (AppError, DriverError, PlanError) as error:
             return {"key": task.key, "bad": " ".join(str(error).replace(folder, "").split())}
         if not report.ok:
-            return {"key": task.key, "bad": report.notes[0]}
+            return {"key": task.key, "bad": report.failure}
         return {"key": task.key, "wav": path.read_bytes(), "json": path.with_suffix(".json").read_bytes()}
 
 

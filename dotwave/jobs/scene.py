@@ -16,7 +16,7 @@ from planner import PlanError
 from ..errors import AppError
 from ..pictures import picture_scene
 from ..request import Request
-from ..scenes import DeviceScene, SceneFrames, joined, still_scene, text_scene
+from ..scenes import DeviceScene, SceneFrames, joined, shape_of, still_scene, text_scene
 from .job import Item, Job, PicturePart, TextPart, locate_job
 from .paths import Reach
 
@@ -92,7 +92,7 @@ def read_job_scene(path: Path, *, root: Path | None = None, device: Device | Non
             scenes.append(_Item(item, job, device, reach, at).scene())
         except EncodeError as error:
             raise AppError(f"{at()}: {error}") from None
-    whole = joined(scenes, GridShape(device.rows, device.cols))
+    whole = joined(scenes, shape_of(device))
     return JobScene(whole.shape, whole.frames, whole.encoding, whole.parts, located=located, device=device, out=out)
 
 
@@ -108,7 +108,7 @@ class _Item:
 
     @property
     def shape(self) -> GridShape:
-        return GridShape(self.device.rows, self.device.cols)
+        return shape_of(self.device)
 
     def scene(self) -> Scene:
         item = self.item

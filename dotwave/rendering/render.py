@@ -11,14 +11,14 @@ from typing import Any
 from chainsim import Device, Outcome
 from drivers import FORMATS, WrittenPlan, check_suffix, write_plan
 from encoders import Scene, TextScene
-from planner import FramePlan, Plan, PlanError, plan_scene
+from planner import FramePlan, Plan, plan_scene
 
 from ..progress import progress
 from ..reports.report import Report
 from ..reports.text import TextReport
 from ..reports.totals import Totals, nearest_lines
 from ..request import Request
-from ..scenes import DeviceScene
+from ..scenes import placed
 from ..studies.judge import Judge
 from .extent import extent_of, go_on
 from .text_findings import text_findings
@@ -53,12 +53,8 @@ def render(scene: Scene, device: Device, out: Path | None = None, request: Reque
     if out is not None and FORMATS[check_suffix(out)].sample_bytes:
         go_on(extent_of(scene.frames, device, out, request.encoding), out, yes=request.yes)
     passage = _Passage(plan, Judge(request), writes=out is not None)
-    try:
+    with placed(scene):
         written = _carried_out(passage, out, request)
-    except PlanError as error:
-        if not isinstance(scene, DeviceScene):
-            raise
-        raise scene.placed(error) from None
     report = _report(scene, passage, written, request)
     found = passage.judge.findings()
     seconds = time.perf_counter() - began
@@ -88,7 +84,8 @@ class _Passage:
     writes: bool
     totals: Totals = field(default_factory=Totals)
     walks: dict[str, int] = field(default_factory=dict)
-    failure: tuple[str, ...] = ()
+    failure: str = ""
+    lacking: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[FramePlan]:
         for number, frame in enumerate(self.judge.judged(self.plan), 1):
@@ -103,7 +100,7 @@ class _Passage:
         """A line for every pace, with the first frame that has it; then what is lacking for the first that failed."""
         for pace, number in self.walks.items():
             yield f"Frame {number}: {pace} bars a second walk past an actuator."
-        yield from self.failure
+        yield from filter(None, (self.failure, *self.lacking))
 
     def _pace(self, frame: FramePlan) -> str:
         """The slowest and the quickest walk of a frame, bars a second."""
@@ -118,7 +115,7 @@ class _Passage:
         if not self.failure:
             nearest = () if late else nearest_lines(frame, self.plan.device)
             end = ("Nothing was written.",) if self.writes else ()
-            self.failure = (f"Frame {number}: {frame.note}", *nearest, *end)
+            self.failure, self.lacking = f"Frame {number}: {frame.note}", (*nearest, *end)
         if self.writes or late:
             raise _Stopped
 
@@ -131,6 +128,7 @@ def _report(scene: Scene, passage: _Passage, written: WrittenPlan | None, reques
         "files": () if written is None else tuple(map(str, written.files)),
         "peak_volts": peak if written is None or written.peak_volts is None else written.peak_volts,
         "limit_volts": device.amplifier.volts,
+        "failure": passage.failure,
     }
     if isinstance(scene, TextScene):
         found = text_findings(scene)

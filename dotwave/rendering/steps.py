@@ -9,9 +9,10 @@ import numpy as np
 
 from chainsim import Device
 from drivers import atomic_file, naming
-from encoders import GridShape, PictureOptions, explain_picture
+from encoders import PictureOptions, explain_picture
 
 from ..pictures import pitched
+from ..scenes import shape_of
 
 __all__ = ["write_steps"]
 
@@ -28,7 +29,7 @@ def write_steps(files: Sequence[Path], device: Device, options: PictureOptions, 
     """
     from PIL import Image
 
-    shape, options = GridShape(device.rows, device.cols), pitched(options, device)
+    shape, options = shape_of(device), pitched(options, device)
     written = []
     with naming(folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -31,7 +31,8 @@ class Report(ABC):
     ramp_s : longest way into a frame.
     error : predicted worst deviation in units of full scale.
     outcomes : outcome -> number of frames.
-    notes : sentences a person should read.
+    failure : what is lacking for the first frame that cannot be made as asked; empty where all can.
+    notes : sentences a person should read; that one is among them.
     seconds : time taken.
     well : largest deflection over the limit of the softening well, noise_gain : largest magnification of disturbances
         of any pattern, slew : fastest change of a steady drive over the amplifier's, multiplier : largest Floquet
@@ -53,6 +54,7 @@ class Report(ABC):
     ramp_s: float
     error: float
     outcomes: Mapping[str, int]
+    failure: str = ""
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
     well: float = 0.0

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from chainsim import Device, load_device
-from encoders import GridShape, Scene, TargetPattern, TextOptions, encode_text
+from encoders import Scene, TargetPattern, TextOptions, encode_text
 from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
 
 from ..errors import AppError
 from ..reports.html import html_table
 from ..reports.report import plain
 from ..request import FrameRequest, picture_name
+from ..scenes import shape_of
 from ..source import text_source
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def planned(source: str, device: str | None, *, otherwise: str = "paper-6x6") ->
         scene, profile, contrast_db = _of_job(Path(source), None if device is None else load_device(device))
     else:
         profile, contrast_db = load_device(device or otherwise), DEFAULT_CONTRAST_DB
-        scene = encode_text(text_source(source), GridShape(profile.rows, profile.cols), TextOptions())
+        scene = encode_text(text_source(source), shape_of(profile), TextOptions())
     return scene, plan_scene(scene, profile, contrast_db=contrast_db)
 
 

@@ -27,7 +27,6 @@ PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
 _ARROWS = "\u2190"
-_NO_ARROWS = "\u2190"
 _BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
