@@ -1,11 +1,10 @@
 """Try every hostile setting on every rung and system, and draw what came out: docs/stability.png and .json.
 
-Run with ``python benchmarks/stability_map.py``; takes some minutes. The list is the one the tests use.
+Run with ``python -m benchmarks.stability_map``; takes some minutes. The list is the one the tests use.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import time
 from collections import Counter
@@ -15,6 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from chainsim import RungError, solve, steady_from_rest
+from tests.support.hostile import HOSTILE, SYSTEMS, built
 
 ROOT = Path(__file__).resolve().parent.parent
 COLOURS = {
@@ -25,24 +25,16 @@ RUNGS = ["static", "linear", "one_harmonic", "harmonic_balance", "envelope", "od
 CELL, LEFT, TOP = 22, 330, 150
 
 
-def hostile_list():
-    path = ROOT / "tests" / "chainsim" / "test_hostile.py"
-    spec = importlib.util.spec_from_file_location("hostile", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def shortest(value):
     """The shortest text that is this very number: 1 and its neighbours are three rows."""
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
 
 
-def tried(module):
-    for extreme in module.HOSTILE:
+def tried():
+    for extreme in HOSTILE:
         for rung in RUNGS:
-            for system in module.SYSTEMS:
-                chain, setting = module.built(system, extreme)
+            for system in SYSTEMS:
+                chain, setting = built(system, extreme)
                 began = time.perf_counter()
                 try:
                     if rung == "ode" and chain.n > 100 and not chain.feed_forward:
@@ -91,13 +83,12 @@ def draw(found, rows, systems):
 
 
 def main():
-    module = hostile_list()
-    found = list(tried(module))
+    found = list(tried())
     rows = list(dict.fromkeys(one["extreme"] for one in found))
     (ROOT / "docs" / "stability.json").write_text(
         "[\n" + ",\n".join(json.dumps(one) for one in found) + "\n]\n", encoding="utf-8"
     )
-    draw(found, rows, list(module.SYSTEMS))
+    draw(found, rows, list(SYSTEMS))
     for rung in RUNGS:
         count = Counter(one["outcome"] for one in found if one["rung"] == rung)
         slowest = max((one for one in found if one["rung"] == rung), key=lambda one: one["seconds"])

@@ -1,8 +1,6 @@
 """Hostile inputs: an Outcome or a ValueError, never a NaN marked ok; the right answer by mpmath where there is one."""
 
-import importlib.util
 import itertools
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -10,14 +8,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainsim import Chain, Outcome, Setting, solve
+from tests.support.hostile import ESCAPE, HOSTILE, SYSTEMS, built, fold
 
 STEADY = ["static", "linear", "one_harmonic", "harmonic_balance"]
-ESCAPE = 2 / (3 * np.sqrt(3))
 BETAS = [0.0, 1.0, -1.0, -1e6, -1e12, 1e-300, -5e-324, 1e300]
 DELTAS = [0.0, 1e-9, 5e-3, 3.0]
-_spec = importlib.util.spec_from_file_location("hostile", Path(__file__).with_name("test_hostile.py"))
-hostile = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(hostile)
 mp = mpmath.mp.clone()
 mp.dps = 60
 
@@ -118,13 +113,13 @@ def linear_system(chain, setting):
     return [complex(a) for a in mp.lu_solve(matrix, push)], [float(c) for c in mp.lu_solve(still, load)]
 
 
-@pytest.mark.parametrize("system", list(hostile.SYSTEMS))
+@pytest.mark.parametrize("system", list(SYSTEMS))
 def test_linear_chains_against_sixty_digits(system):
     judged = 0
-    for extreme in hostile.HOSTILE:
+    for extreme in HOSTILE:
         if extreme.get("n", 6) > 6:
             continue
-        chain, setting = hostile.built(system, extreme | {"beta": 0.0})
+        chain, setting = built(system, extreme | {"beta": 0.0})
         found = solve(chain, setting, tol=1e-6, rung="linear", start="ramp")
         if not found.locked[0] or found.error_estimate[0] > 1e-3:
             continue
@@ -136,7 +131,7 @@ def test_linear_chains_against_sixty_digits(system):
     assert judged >= 30
 
 
-@pytest.mark.parametrize("system", list(hostile.SYSTEMS))
+@pytest.mark.parametrize("system", list(SYSTEMS))
 def test_faint_motions_are_the_linear_ones(system):
     """Where the cubic term's share is below 1e-13 harmonic balance has the linear chain's answer, whatever else."""
     extremes = [{"omega": value} for value in (1e3, 1e6)]
@@ -144,7 +139,7 @@ def test_faint_motions_are_the_linear_ones(system):
     faint = ({"delta": 1e-12}, {"delta": 1e6}, {"lam": 1e-12}, {"omega": 1e-6})
     extremes += [{"epsilon": 1e-9, **each} for each in faint]
     for extreme in extremes:
-        chain, setting = hostile.built(system, extreme)
+        chain, setting = built(system, extreme)
         found = solve(chain, setting, tol=1e-6, rung="harmonic_balance")
         phasor, _ = linear_system(chain, setting)
         away = np.abs(found.phasor[0] - phasor).max()
@@ -155,8 +150,8 @@ def test_faint_motions_are_the_linear_ones(system):
 @pytest.mark.parametrize("beta", [-1.0, 1.0, -1e12, 1e-12])
 def test_one_harmonic_against_the_cubic_with_fifty_digits(beta):
     length = np.sqrt(abs(beta))
-    fold = hostile.fold(5e-3, 0.985)
-    points = [(5e-3, 0.985, fold * (1 + by)) for by in (-1e-6, -1e-12, 1e-12, 1e-6)]
+    end = fold(5e-3, 0.985)
+    points = [(5e-3, 0.985, end * (1 + by)) for by in (-1e-6, -1e-12, 1e-12, 1e-6)]
     omegas = [1e-6, 1e-3, 0.9, np.nextafter(1.0, 0), 1e3]
     points += itertools.product([1e-12, 5e-3, 1.0, 1e6], omegas, [1e-12, 1e-3, 3.0])
     for delta, omega, force in points:
@@ -176,7 +171,7 @@ def test_one_harmonic_against_the_cubic_with_fifty_digits(beta):
         mine = abs(found.phasor[0, 0])
         nearest = min(abs(mine - float(mp.sqrt(root / abs(strength)))) for root in real)
         # At a fold the answer is the square root of rounding; elsewhere rounding over the sharpness.
-        slack = 2e-6 if abs(force - fold) <= 1e-5 * fold else 1e-12 + 1e-15 / max(delta * omega, 1e-12)
+        slack = 2e-6 if abs(force - end) <= 1e-5 * end else 1e-12 + 1e-15 / max(delta * omega, 1e-12)
         assert nearest <= slack * mine, (delta, omega, force)
 
 

@@ -19,19 +19,16 @@ from drivers.protocol.early import MOST_EARLY, EarlyPackets
 from drivers.protocol.faults import Faults, FaultyLine
 from drivers.protocol.host_session import HELLO, STOP, HostSession, Timing
 from drivers.protocol.messages import VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
-from drivers.protocol.outgoing import End, Message
+from drivers.protocol.outgoing import Message
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
 from drivers.protocol.playout import ControllerSpec, Event
 from drivers.protocol.replies import Ack, Capabilities, Flag, Marked, State
 from drivers.protocol.under_way import UnderWay
 from drivers.protocol.virtual_controller import VirtualController
+from tests.support.wire import SPEC, stream
 
 ROOT = Path(__file__).resolve().parents[2]
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-SPEC = ControllerSpec(
-    rows=2, cols=3, channels=2, rate_hz=8000, buffer_samples=2000, event_slots=16, full_volts=100.0,
-    lam_step=1 / 65535, lam_max=1.0, watchdog_s=0.2, ramp_s=0.05, drift_ppm=0.0,
-)  # fmt: skip
 # The widest stream of the built-in profiles, whose packets carry 6 ms.
 WIDE = replace(SPEC, rows=6, cols=6, channels=42, buffer_samples=4000, event_slots=256)
 
@@ -39,16 +36,6 @@ WIDE = replace(SPEC, rows=6, cols=6, channels=42, buffer_samples=4000, event_slo
 def codes_of(seconds: float, seed: int, spec: ControllerSpec = SPEC) -> np.ndarray:
     rng = np.random.default_rng(seed)
     return rng.integers(-9, 9, (round(seconds * spec.rate_hz), spec.channels), dtype=np.int16)
-
-
-def stream(codes: np.ndarray, marks: list[int], _: Capabilities) -> Iterator[Message]:
-    yield StartMessage(7, False, SPEC.rate_hz, len(codes))
-    for first in range(0, len(codes), 48):
-        for number, at in enumerate(marks):
-            if first <= at < first + 48:
-                yield Mark(at, number)
-        yield SamplesMessage(first, codes[first : first + 48])
-    yield End(len(codes))
 
 
 @dataclass

@@ -11,18 +11,15 @@ import pytest
 
 from drivers.protocol.faults import Faults, FaultWindow, FaultyLine
 from drivers.protocol.host_session import STOP, ControllerRefused, HostSession, SessionLost, Timing
-from drivers.protocol.messages import FULL_CODE, Bias, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones, WireTone
+from drivers.protocol.messages import FULL_CODE, Bias, LinkCoupling, SamplesMessage, StartMessage, Tones, WireTone
 from drivers.protocol.outgoing import End, Message
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
 from drivers.protocol.playout import ControllerSpec, OutputBlock
 from drivers.protocol.replies import Capabilities, State
 from drivers.protocol.virtual_controller import VirtualController
+from tests.support.wire import SPEC, stream
 
 STEP_S = 0.001
-SPEC = ControllerSpec(
-    rows=2, cols=3, channels=2, rate_hz=8000, buffer_samples=2000, event_slots=16, full_volts=100.0,
-    lam_step=1 / 65535, lam_max=1.0, watchdog_s=0.2, ramp_s=0.05, drift_ppm=0.0,
-)  # fmt: skip
 
 
 @dataclass
@@ -53,16 +50,6 @@ def codes_of(seconds: float, seed: int = 1) -> np.ndarray:
     codes = rng.integers(-FULL_CODE, FULL_CODE, (round(seconds * SPEC.rate_hz), SPEC.channels), dtype=np.int16)
     codes[rng.random(codes.shape) < 0.3] = 0
     return codes
-
-
-def stream(codes: np.ndarray, marks: list[int], _: Capabilities) -> Iterator[Message]:
-    yield StartMessage(7, False, SPEC.rate_hz, len(codes))
-    for first in range(0, len(codes), 48):
-        for number, at in enumerate(marks):
-            if first <= at < first + 48:
-                yield Mark(at, number)
-        yield SamplesMessage(first, codes[first : first + 48])
-    yield End(len(codes))
 
 
 class Bench:

@@ -13,31 +13,13 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
-from chainsim import Amplifier, Device, Outcome, Span, load_device
+from chainsim import Device, Outcome
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
 from drivers.waveform.coupling import CouplingWriter, LamTrack
 from drivers.waveform.timeline import PlacedFrame
-from encoders import Frame, TargetPattern
+from encoders import Frame
 from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
-
-PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
-NAMES = ["linked-6x6", "paper-6x6", "independent-6x6", "linked-40x96"]
-
-
-def load(name: str) -> Device:
-    """A built-in profile's layout with the numbers these tests count on."""
-    device = load_device(name)
-    lam = Span(min=0.0, max=1.0 if device.coupling.scope == "link" else 0.0)
-    return device.model_copy(
-        update={
-            "f0_hz": 133.13,
-            "epsilon_per_volt": 2e-3,
-            "bias_per_volt": 2e-3,
-            "omega": Span(min=0.9, max=1.5),
-            "coupling": device.coupling.model_copy(update={"lam": lam}),
-            "amplifier": Amplifier(volts=100.0, slew_v_per_s=3e5, rate_hz=8000),
-        }
-    )
+from tests.support.plans import NAMES, PATTERN, load
 
 
 def state(
