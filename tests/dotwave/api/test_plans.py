@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 import dotwave as dw
+from chainsim import Outcome
 from dotwave.api import plans
 from drivers import read_waveform
 from encoders.braille import text as encoder
+from planner import Plan, plan_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 HEAVY = {"PIL", "dask", "matplotlib", "numba", "scipy"}
@@ -212,3 +214,23 @@ def test_words_choose_as_objects_do() -> None:
     assert len(list(by_word.frames)) > len(list(dw.text("Hi", "paper-6x6").frames))
     heart = ROOT / "samples" / "icons" / "heart.svg"
     assert dw.image(heart.read_bytes(), style="photo").parts[0].startswith("photo: ")
+
+
+def test_the_frame_that_failed_is_named_not_one_that_was_remarked_upon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def second_fails(*args: Any, **kwargs: Any) -> Plan:
+        made = plan_scene(*args, **kwargs)
+        first, second, *rest = made.frames
+        return replace(made, frames=[first, replace(second, outcome=Outcome.UNREACHABLE, note="not this"), *rest])
+
+    monkeypatch.setattr("dotwave.rendering.render.plan_scene", second_fails)
+    job = tmp_path / "job.yaml"
+    walk = "  - texture: {walking_bars: {width: 2, rate_hz: 3, level: 0.3}, dwell_s: 3}\n"
+    job.write_text("schema: dotwave/job/1\ndevice: independent-6x6\nsequence:\n" + 2 * walk, encoding="utf-8")
+    plan = dw.plan(dw.job(job))
+    report = plan.report()
+    assert report.failure == "Frame 2: not this"
+    assert report.notes[:2] == ("Frame 1: 3 bars a second walk past an actuator.", report.failure)
+    with pytest.raises(dw.NotMade, match=r"^Frame 2: not this$"):
+        plan.waveform().write(tmp_path / "x.wav")
