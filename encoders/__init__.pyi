@@ -7,6 +7,7 @@ from .braille.back_check import (
     covered_text as covered_text,
 )
 from .braille.choices import (
+    Grade as Grade,
     Presentation as Presentation,
     Undefined as Undefined,
 )
@@ -42,10 +43,13 @@ from .braille.report import (
     Split as Split,
     UndefinedUse as UndefinedUse,
 )
-from .braille.tables import (
+from .braille.table_queries import (
     TableInfo as TableInfo,
-    foreign_tables as foreign_tables,
     list_tables as list_tables,
+    recommended_tables as recommended_tables,
+)
+from .braille.tables import (
+    foreign_tables as foreign_tables,
     resolve_tables as resolve_tables,
 )
 from .braille.text import (

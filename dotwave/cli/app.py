@@ -22,7 +22,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import Presentation, Undefined
+from encoders import Grade, Presentation, Undefined
 
 from ..errors import Terminated
 from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
@@ -66,6 +66,12 @@ def text(
         Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
     ] = None,
     table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
+    language: Annotated[
+        str | None, typer.Option(help="Language of the text, such as de, instead of --table.", metavar="TAG")
+    ] = None,
+    grade: Annotated[
+        Grade | None, typer.Option(help="With --language: whether words are shortened; uncontracted if not said.")
+    ] = None,
     undefined: Annotated[
         Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
     ] = None,
@@ -111,8 +117,8 @@ def text(
         actuator=place_of(actuator), yes=yes,
     )  # fmt: skip
     options = text_options(
-        table=table, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap, rate=rate, dwell_s=dwell,
-        presentation=presentation, dots=dots, blank_between=blank_between,
+        table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
+        rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
     )  # fmt: skip
     profile = device_of(device)
     report = render(text_scene(text_source(source), profile, options), profile, output, request)

@@ -49,17 +49,23 @@ class TableListing:
     tables: tuple[TableInfo, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """The tables under ``tables``."""
-        return {"tables": [{key: getattr(table, key) for key in _TABLE_KEYS} for table in self.tables]}
+        """The tables under ``tables``; ``recommended`` is the grade that each is given for, empty for the others."""
+        return {"tables": [dict(zip(_TABLE_KEYS, _row(table), strict=True)) for table in self.tables]}
 
     def as_text(self) -> str:
-        """One line per table: file, language, grade, name."""
-        rows = [[str(getattr(table, key) or "-") for key in _TABLE_KEYS] for table in self.tables]
+        """One line per table: file, language, grade, what it is recommended for, name."""
+        rows = [[value or "-" for value in _row(table)] for table in self.tables]
         widths = [max(len(row[column]) for row in rows) for column in range(len(_TABLE_KEYS))]
         return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
 
 
-_TABLE_KEYS = ("file", "language", "grade", "name")
+_TABLE_KEYS = ("file", "language", "grade", "recommended", "name")
+
+
+def _row(table: TableInfo) -> tuple[str, ...]:
+    from encoders import recommended_tables
+
+    return table.file, table.language, table.grade, recommended_tables().get(table.file, ""), table.name
 
 
 def list_devices(name: str | None) -> DeviceListing:

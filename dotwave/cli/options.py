@@ -6,6 +6,8 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from encoders import Grade
+
 from ..errors import AppError
 
 if TYPE_CHECKING:
@@ -34,12 +36,19 @@ def text_options(**given: Any) -> TextOptions:
 
     Raises
     ------
-    encoders.EncodeError
-        When a value is out of range.
+    AppError, encoders.EncodeError
+        When a value is out of range, or a language is given beside a table.
     """
     from encoders import TextOptions
 
     chosen = {name: value for name, value in given.items() if value is not None}
+    language, grade = chosen.pop("language", None), chosen.pop("grade", None)
+    if language is not None:
+        if "table" in chosen:
+            raise AppError(f"--language: --table {chosen['table']} names the table; give one of them")
+        chosen["table"] = f"language:{language} grade:{grade or Grade.UNCONTRACTED}"
+    elif grade is not None:
+        raise AppError(f"--grade {grade}: it chooses between tables of a language; give --language too")
     if "dots" in chosen:
         chosen["dots"] = None if chosen["dots"] is Dots.AUTO else int(chosen["dots"].value)
     return replace(TextOptions(), **chosen)

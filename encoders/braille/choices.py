@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["Presentation", "Undefined"]
+__all__ = ["Grade", "Presentation", "Undefined"]
 
 
 class Undefined(StrEnum):
@@ -13,6 +13,13 @@ class Undefined(StrEnum):
     NAME = "name"
     DROP = "drop"
     ERROR = "error"
+
+
+class Grade(StrEnum):
+    """Whether words are written sign by sign, or shortened by the rules of the language's Braille."""
+
+    UNCONTRACTED = "uncontracted"
+    CONTRACTED = "contracted"
 
 
 class Presentation(StrEnum):

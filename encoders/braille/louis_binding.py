@@ -20,7 +20,6 @@ from ..errors import LouisMissing
 
 __all__ = [
     "back_translate",
-    "best_table",
     "compiles",
     "complaint",
     "hyphenate",
@@ -104,8 +103,6 @@ def _from_distribution() -> ModuleType | None:
 def _declare(library: Any) -> None:
     """Types of the calls the binding of 3.24 lacks."""
     library.lou_listTables.restype = ctypes.POINTER(ctypes.c_char_p)
-    library.lou_findTable.restype = ctypes.c_char_p
-    library.lou_findTable.argtypes = (ctypes.c_char_p,)
     library.lou_getTableInfo.restype = ctypes.c_char_p
     library.lou_getTableInfo.argtypes = (ctypes.c_char_p, ctypes.c_char_p)
 
@@ -187,12 +184,3 @@ def table_info(path: str, key: str) -> str:
     with _lock:
         value = _louis().liblouis.lou_getTableInfo(path.encode(), key.encode())
         return value.decode("utf-8", "replace") if value else ""
-
-
-def best_table(query: str) -> str:
-    """Path of the table the library finds best for a query, empty when none."""
-    with _lock:
-        _louis()
-        listed_tables()  # indexes the tables once; before that the search finds nothing
-        found = _louis().liblouis.lou_findTable(query.encode())
-        return found.decode() if found else ""

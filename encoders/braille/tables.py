@@ -4,67 +4,15 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
 from ..errors import TableMissing
 from . import louis_binding
+from .table_queries import answer, list_tables
 
-__all__ = ["TableInfo", "foreign_tables", "hyphenation_tables", "list_tables", "resolve_tables", "table_dots"]
-
-
-@dataclass(frozen=True)
-class TableInfo:
-    """One table, from liblouis's own metadata; a field it does not state is empty (`dots`: 0).
-
-    Attributes
-    ----------
-    file : name of the table file.
-    language : BCP 47 tag.
-    grade : contraction grade.
-    name : what to show to a person.
-    contraction : ``full``, ``partial`` or ``no``.
-    dots : 6 or 8.
-    direction : ``forward`` when the table is not made for back-translation.
-    """
-
-    file: str
-    language: str
-    grade: str
-    name: str
-    contraction: str
-    dots: int
-    direction: str
-
-
-@cache
-def list_tables() -> tuple[TableInfo, ...]:
-    """All tables that carry metadata, sorted by language, grade and file.
-
-    Raises
-    ------
-    LouisMissing
-        When liblouis is not installed.
-    """
-    found = (_info(path) for path in louis_binding.listed_tables())
-    return tuple(sorted(found, key=lambda info: (info.language, info.grade, info.file)))
-
-
-def _info(path: str) -> TableInfo:
-    def value(key: str) -> str:
-        return louis_binding.table_info(path, key)
-
-    return TableInfo(
-        file=Path(path).name,
-        language=value("language"),
-        grade=value("grade"),
-        name=value("display-name") or value("index-name") or value("name"),
-        contraction=value("contraction"),
-        dots={"6": 6, "8": 8}.get(value("dots"), 0),
-        direction=value("direction"),
-    )
+__all__ = ["foreign_tables", "hyphenation_tables", "resolve_tables", "table_dots"]
 
 
 def resolve_tables(spec: str) -> tuple[str, ...]:
@@ -72,8 +20,8 @@ def resolve_tables(spec: str) -> tuple[str, ...]:
 
     Parameters
     ----------
-    spec : a file name (``en-ueb-g2.ctb``), a list (``a.ctb,b.dic``), or a query (``language:de grade:2``).
-        Of several that answer a query, 6-dot literary tables come first, then what liblouis finds best.
+    spec : a file name (``en-ueb-g2.ctb``), a list (``a.ctb,b.dic``), or a query (``language:de grade:contracted``),
+        see `table_queries.answer`.
 
     Raises
     ------
@@ -84,7 +32,7 @@ def resolve_tables(spec: str) -> tuple[str, ...]:
     """
     wish = _checked(spec)
     if _is_query(wish):
-        return (_answer(wish),)
+        return (answer(wish),)
     tables = tuple(part.strip() for part in wish.split(",") if part.strip())
     for name in tables:
         # liblouis would wait for a pipe, and read a device without an end.
@@ -108,37 +56,6 @@ def _checked(spec: str) -> str:
 
 def _is_query(wish: str) -> bool:
     return ":" in wish and not any(sign in wish for sign in "/\\")
-
-
-def _answer(query: str) -> str:
-    wishes = [part.partition(":") for part in query.split()]
-    fitting = [path for path in louis_binding.listed_tables() if all(_fits(path, k, v) for k, _, v in wishes)]
-    if not fitting:
-        raise TableMissing(f"table: none answers the query {query!r}{_nearest_answers(wishes)}")
-    best = louis_binding.best_table(query)
-
-    def rank(path: str) -> tuple[bool, bool, bool, str]:
-        eight, kind = louis_binding.table_info(path, "dots") == "8", louis_binding.table_info(path, "type")
-        return eight, kind != "literary", path != best, path
-
-    return Path(min(fitting, key=rank)).name
-
-
-def _fits(path: str, key: str, value: str) -> bool:
-    found = louis_binding.table_info(path, key).casefold()
-    wanted = value.casefold()
-    return found == wanted or (key == "language" and found.startswith(wanted + "-"))
-
-
-def _nearest_answers(wishes: list[tuple[str, str, str]]) -> str:
-    wanted = next((value.casefold() for key, _, value in wishes if key == "language"), "")
-    tables = list_tables()
-    close = [info for info in tables if info.language.casefold().split("-")[0] == wanted.split("-")[0]]
-    if not close:
-        names = get_close_matches(wanted, sorted({info.language for info in tables}), n=3, cutoff=0.5)
-        return f"; languages nearest to {wanted!r}: {', '.join(names)}" if names else "; 'dotwave tables' lists all"
-    shown = ", ".join(f"{info.file} (grade {info.grade or 'not stated'})" for info in close[:4])
-    return f"; for language {wanted} there are: {shown}"
 
 
 # liblouis keeps names in buffers of its own.
@@ -186,7 +103,7 @@ def foreign_tables(spec: str) -> tuple[str, ...]:
         When liblouis is not installed.
     """
     wish = _checked(spec)
-    names = [_answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
+    names = [answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
     own = {path.name for folder in _folders() for path in folder.iterdir()}
     return tuple(name for name in names if name not in own or os.path.lexists(name))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from encoders import LouisMissing, TableMissing, list_tables, resolve_tables
+from encoders import LouisMissing, TableMissing, list_tables, recommended_tables, resolve_tables
 from encoders.braille import louis_binding, louis_cure
 from encoders.braille.tables import foreign_tables, hyphenation_tables, table_dots
 
@@ -32,6 +32,20 @@ def test_tables_carry_metadata():
         ("language:de grade:2", ("de-g2.ctb",)),
         ("language:pl", ("pl.tbl",)),
         ("language:hi", ("hi.tbl",)),
+        ("language:en", ("en-ueb-g1.ctb",)),
+        ("language:en-GB grade:contracted", ("en-ueb-g2.ctb",)),
+        ("language:de", ("de-g0.utb",)),
+        ("language:de grade:contracted", ("de-g2.ctb",)),
+        ("language:ru grade:uncontracted", ("ru-litbrl.ctb",)),
+        ("language:fr grade:1", ("fr-bfu-comp6.utb",)),
+        ("language:pl grade:1", ("pl.tbl",)),
+        ("language:fa", ("fa-ir-g1.utb",)),
+        ("language:zh", ("zhcn-cbs.ctb",)),
+        ("language:zh-Hant-TW", ("zh-tw.ctb",)),
+        ("language:zh-HK", ("zh_HK.tbl",)),
+        ("language:nb grade:contracted", ("no-no-g3.ctb",)),
+        ("language:da grade:contracted", ("da-dk-g26.ctb",)),
+        ("language:da grade:2 dots:8", ("da-dk-g28.ctb",)),
     ],
 )
 def test_specs(spec, tables):
@@ -47,6 +61,9 @@ def test_specs(spec, tables):
         ("en-ueb-g2.ctb,none.dic", "'none.dic'"),
         ("language:de grade:9", "for language de there are: de-"),
         ("language:xx", "none answers the query"),
+        ("language:th", "no table for language 'th'; 'dotwave tables' lists those it has, a newer liblouis"),
+        ("language:german", r"did you mean de \(German\)"),
+        ("language:ms grade:uncontracted", r"for language ms there are: ms-my-g2.ctb \(Malay braille\)"),
         ("", "empty"),
         (",", "no such table|does not compile"),
         ("x" * 5000, "5000 characters; a name or list of names has at most 1000"),
@@ -69,6 +86,15 @@ def test_a_table_that_does_not_compile_says_why(tmp_path, capfd):
         resolve_tables(str(path))
     assert "nonsense" not in str(caught.value), "what stands in a file is told to nobody"
     assert capfd.readouterr() == ("", ""), "the library itself prints nothing"
+
+
+def test_every_language_of_literary_braille_has_a_recommended_table():
+    found = recommended_tables()
+    assert (found["en-ueb-g2.ctb"], found["de-g0.utb"]) == ("contracted", "uncontracted")
+    of = {info.language.split("-")[0]: False for info in list_tables() if info.kind == "literary" and info.dots != 8}
+    of |= {info.language.split("-")[0]: True for info in list_tables() if info.file in found}
+    assert all(of.values()), of
+    assert not [info.file for info in list_tables() if info.file in found and info.kind == "computer"]
 
 
 def test_tables_that_liblouis_did_not_bring_along(tmp_path, monkeypatch):
@@ -96,7 +122,6 @@ def test_hyphenation_dictionaries_are_found_by_language():
 
 def test_a_noisy_table_prints_nothing(capfd):
     louis_binding.translate(("ko-g2.ctb",), "한국어")
-    louis_binding.best_table("language:zz")
     assert capfd.readouterr() == ("", "")
 
 

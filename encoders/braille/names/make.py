@@ -7,7 +7,7 @@ import lzma
 import sys
 from pathlib import Path
 
-from ..tables import list_tables
+from ..table_queries import list_tables
 from . import cldr_language
 
 __all__ = ["main"]

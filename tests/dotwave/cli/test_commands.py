@@ -197,7 +197,7 @@ def test_tables(dotwave) -> None:
     files = [table["file"] for table in answer["tables"]]
     assert "en-ueb-g2.ctb" in files
     assert "de-g2.ctb" not in files
-    assert {"file", "language", "grade", "name"} == set(answer["tables"][0])
+    assert {"file", "language", "grade", "recommended", "name"} == set(answer["tables"][0])
     lines = dotwave("tables", "en-ueb").out.splitlines()
     assert [line.split()[0] for line in lines] == files
     assert dotwave("tables", "no such language").code == 2
