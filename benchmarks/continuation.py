@@ -35,7 +35,10 @@ def pyharm(goal: float) -> dict[str, Any]:
         here = PYHARM.parent.parent
         raise Missing(f"pyHarm-os has no environment: python3 -m venv {here} && {here}/bin/pip install pyHarm-os")
     base = {"epsilon": 4e-4, "lam": 6.131e-3}
-    solvers = (("scipyroot", {}), ("NewtonRaphson", {"tol_residual": 1e-9, "tol_delta_x": 1e-5}))
+    solvers: tuple[tuple[str, dict[str, float]], ...] = (
+        ("scipyroot", {}),
+        ("NewtonRaphson", {"tol_residual": 1e-9, "tol_delta_x": 1e-5}),
+    )
     ways = [
         {"harmonics": harmonics, "samples": 16, "solver": solver, "options": options, "predictor": predictor,
          "corrector": corrector}

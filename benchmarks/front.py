@@ -102,7 +102,8 @@ def _beating(frames: list[FramePlan], device: Device) -> dict[str, Any]:
     state = frames[0].states[0]
     every = [(state.omega, state.epsilon), *((tone.omega, tone.epsilon) for tone in state.tones)]
     strongest = sorted(every, key=lambda one: -abs(one[1]))[:2]
-    tones = tuple(Tone(abs(epsilon), omega, float(np.angle(epsilon))) for omega, epsilon in strongest)
+    one, other = (Tone(abs(epsilon), omega, float(np.angle(epsilon))) for omega, epsilon in strongest)
+    tones = one, other
     setting = Setting.of(device.chain, epsilon=0.0, lam=state.lam, omega=1.0)
     truth = two_tones(device.chain, setting, tones, order=DEAREST)
     rows = []

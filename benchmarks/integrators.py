@@ -125,6 +125,7 @@ def numbalsoda() -> Iterator[Way]:
     """Its dop853 in Fortran behind a compiled right side, many chains as one system."""
     try:
         import numba as nb
+        from numba.np.numpy_support import carray
         from numbalsoda import dop853, lsoda_sig
     except ImportError:
         raise Missing("numbalsoda is not installed: pip install numbalsoda (needs gfortran and cmake)") from None
@@ -135,8 +136,8 @@ def numbalsoda() -> Iterator[Way]:
     def right(rows: int, lanes: int) -> object:
         @nb.cfunc(lsoda_sig, fastmath=True)
         def made(phase, y_, out_, given_):  # type: ignore[no-untyped-def]
-            y, out = nb.carray(y_, (rows, lanes)), nb.carray(out_, (rows, lanes))
-            slope(phase, y, out, nb.carray(given_, (3, lanes)))
+            y, out = carray(y_, (rows, lanes)), carray(out_, (rows, lanes))
+            slope(phase, y, out, carray(given_, (3, lanes)))
 
         return made
 

@@ -11,6 +11,7 @@ import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +105,7 @@ def transients(size: int, rounds: int) -> list[dict[str, Any]]:
     wanted, peak, cores = states_after(size, 64), _multiplies_per_second(), os.cpu_count() or 1
     found = []
     for steps in (6, 8, 12):
-        wall, cpu = timed(lambda steps=steps: states_after(size, steps), rounds)
+        wall, cpu = timed(partial(states_after, size, steps), rounds)
         kicks = size * PERIODS * steps * 7 * CHAIN.n
         found.append({
             "steps": steps, "chain_periods_per_s": size * PERIODS / wall, "wall_s": wall, "cpu_s": cpu, "cores": cores,
@@ -125,7 +126,7 @@ def _grows(make: Callable[[int], tuple[Chain, Setting]], longest: int) -> dict[s
         if size > longest:
             break
         chain, asked = make(size)
-        work = lambda chain=chain, asked=asked: sweep(chain, asked, tol=1e-6, from_rest=False)  # noqa: E731
+        work = partial(sweep, chain, asked, tol=1e-6, from_rest=False)
         _, cpu = timed(work, 5 if size < 100_000 else 2)
         tracemalloc.start()
         found = work()

@@ -28,7 +28,8 @@ def states_error(found: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDA
     """Worst oscillator of each chain, in its phase plane, relative to its own radius; states are z then v."""
     n = found.shape[1] // 2
     apart = np.hypot(found[:, :n] - wanted[:, :n], found[:, n:] - wanted[:, n:])
-    return (apart / np.hypot(wanted[:, :n], wanted[:, n:])).max(axis=1)
+    worst: NDArray[np.float64] = (apart / np.hypot(wanted[:, :n], wanted[:, n:])).max(axis=1)
+    return worst
 
 
 def median_error(found: NDArray[np.float64], wanted: NDArray[np.float64]) -> float:

@@ -10,12 +10,13 @@ import logging
 import sys
 import time
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 from pyHarm.Maestro import Maestro
 
 
-def chain(asked, way):
+def chain(asked: dict[str, Any], way: dict[str, Any]) -> dict[str, Any]:
     n, lam = asked["n"], asked["lam"]
     stiffness = np.eye(n) + lam * (np.diag([0.0] + [1.0] * (n - 1)) - np.eye(n, k=-1))
     matrices = {"M": np.eye(n), "C": asked["delta"] * np.eye(n), "K": stiffness}
@@ -37,7 +38,7 @@ def chain(asked, way):
     }  # fmt: skip
 
 
-def measured(asked, way):
+def measured(asked: dict[str, Any], way: dict[str, Any]) -> dict[str, Any]:
     maestro = Maestro(chain(asked, way))
     study = maestro.nls["branch"]
     study.initialise("null")
@@ -58,7 +59,7 @@ def measured(asked, way):
     }  # fmt: skip
 
 
-def main():
+def main() -> None:
     asked = json.load(sys.stdin)
     logging.disable(logging.CRITICAL)
     print(json.dumps([version("pyHarm-os"), [measured(asked, way) for way in asked["ways"]]]))

@@ -8,7 +8,9 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -25,12 +27,12 @@ RUNGS = ["static", "linear", "one_harmonic", "harmonic_balance", "envelope", "od
 CELL, LEFT, TOP = 22, 330, 150
 
 
-def shortest(value):
+def shortest(value: float) -> str:
     """The shortest text that is this very number: 1 and its neighbours are three rows."""
     return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
 
 
-def tried():
+def tried() -> Iterator[dict[str, Any]]:
     for extreme in HOSTILE:
         for rung in RUNGS:
             for system in SYSTEMS:
@@ -53,7 +55,7 @@ def tried():
                 }  # fmt: skip
 
 
-def draw(found, rows, systems):
+def draw(found: list[dict[str, Any]], rows: list[str], systems: list[str]) -> None:
     columns = [(rung, system) for rung in RUNGS for system in systems]
     width = LEFT + CELL * len(columns) + 14 * len(RUNGS)
     image = Image.new("RGB", (width, TOP + CELL * len(rows) + 60), "#fbfaf7")
@@ -82,7 +84,7 @@ def draw(found, rows, systems):
     image.save(ROOT / "docs" / "stability.png", optimize=True)
 
 
-def main():
+def main() -> None:
     found = list(tried())
     rows = list(dict.fromkeys(one["extreme"] for one in found))
     (ROOT / "docs" / "stability.json").write_text(

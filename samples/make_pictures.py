@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ HERE = Path(__file__).parent
 Floats = NDArray[np.float64]
 
 
-def save(path: Path, colour: Floats, **options: int) -> None:
+def save(path: Path, colour: Floats, **options: Any) -> None:
     """Write linear light 0..1 as sRGB."""
     coded = np.where(colour <= 0.0031308, 12.92 * colour, 1.055 * np.clip(colour, 1e-9, 1) ** (1 / 2.4) - 0.055)
     path.parent.mkdir(exist_ok=True)
@@ -38,7 +39,8 @@ def weave() -> Floats:
     over = (y // 27 + x // 27) % 2 == 0
     along, across = np.sin(np.pi * (y % 27) / 27), np.sin(np.pi * (x % 27) / 27)
     strand = np.where(over, along, across)[..., None]
-    return strand * np.where(over[..., None], [0.75, 0.5, 0.2], [0.12, 0.06, 0.03])
+    woven: Floats = strand * np.where(over[..., None], [0.75, 0.5, 0.2], [0.12, 0.06, 0.03])
+    return woven
 
 
 def fields() -> Floats:
@@ -81,7 +83,8 @@ def ball(chance: np.random.Generator) -> Floats:
     light = np.clip(-0.45 * across - 0.6 * down + 0.66 * depth, 0, 1)
     lit = (0.08 + 0.9 * light + 0.6 * light**40)[..., None] * np.array([0.95, 0.55, 0.12])
     scene = np.where((across**2 + down**2 < 1)[..., None], lit, scene)
-    return scene * (1 + 0.04 * chance.standard_normal(scene.shape))
+    grainy: Floats = scene * (1 + 0.04 * chance.standard_normal(scene.shape))
+    return grainy
 
 
 if __name__ == "__main__":

@@ -114,7 +114,8 @@ def _default(option: Any) -> str:
 
 def _hints(name: str) -> dict[str, Any]:
     """The annotations of a command's function; they say more than the parser keeps."""
-    parts = (APPLICATION, *(group.typer_instance for group in APPLICATION.registered_groups))
-    found = (one.callback for part in parts for one in part.registered_commands)
+    groups = (group.typer_instance for group in APPLICATION.registered_groups)
+    parts = (APPLICATION, *(group for group in groups if group is not None))
+    found = (one.callback for part in parts for one in part.registered_commands if one.callback is not None)
     callback = next(one for one in found if one.__name__.rstrip("_") == name)
     return get_type_hints(callback, include_extras=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ def made(what: str, name: str) -> str:
     KeyError
         When nothing of that name is made.
     """
-    makers = {
+    makers: dict[str, Callable[[str], str]] = {
         "summary": lambda _: summary(),
         "command": section,
         "api": lambda _: api(),

@@ -10,16 +10,17 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from ..errors import AppError
 from ..workers import Failed, Gone, Made, Ready, Worker
-from .work import Recipe, Record, Task, all_of_batch, code_digest
+from .work import Record, Task, all_of_batch, code_digest
 
 __all__ = ["TASK_S", "ClusterPool", "LocalPool", "Pool", "Work"]
 
-Work = Callable[[Recipe, Sequence[Task]], Iterable[Record]]
-"""Gives a record for each task, in their order, as it goes."""
+Given = TypeVar("Given")
+Work = Callable[[Given, Sequence[Task]], Iterable[Record]]
+"""Gives a record for each task, in their order, as it goes; what it is given besides is mostly a recipe."""
 
 # Processor time of a task; icons take milliseconds, the largest that are let through a few seconds.
 TASK_S = 20.0
@@ -49,7 +50,7 @@ class Pool(ABC):
 
     size: int
 
-    def run(self, work: Work, recipe: Recipe, tasks: Iterable[Task], batch: int) -> Iterator[list[Record]]:
+    def run(self, work: Work[Given], recipe: Given, tasks: Iterable[Task], batch: int) -> Iterator[list[Record]]:
         """Records of all tasks in batches, in the order in which they are finished.
 
         Tasks are drawn as workers need them. Where a batch fails its tasks are tried one by one, and what fails
@@ -67,7 +68,7 @@ class Pool(ABC):
                 yield ended.records or [_lost(task, ended.problem)]
 
     @abstractmethod
-    def _finished(self, work: Work, recipe: Recipe, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
+    def _finished(self, work: Work[Given], recipe: Given, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
         """Batches as they end."""
 
     def __enter__(self) -> Pool:
@@ -114,7 +115,7 @@ class LocalPool(Pool):
         self._workers: list[_Busy] = []
         self._again: deque[tuple[Task, ...]] = deque()
 
-    def _finished(self, work: Work, recipe: Recipe, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
+    def _finished(self, work: Work[Given], recipe: Given, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
         source = iter(batches)
         try:
             while True:
@@ -193,7 +194,7 @@ class _Busy:
     batches: deque[tuple[Task, ...]] = field(default_factory=deque)
     ready: bool = False
 
-    def give(self, work: Work, recipe: Recipe, batch: tuple[Task, ...]) -> None:
+    def give(self, work: Work[Given], recipe: Given, batch: tuple[Task, ...]) -> None:
         self.batches.append(batch)
         self.worker.give(work, recipe, batch)
 
@@ -224,7 +225,7 @@ class ClusterPool(Pool):
             raise AppError(f"{address}: a worker has another version of dotwave; install the same one everywhere")
         self.size = max(1, sum(self._client.nthreads().values()))
 
-    def _finished(self, work: Work, recipe: Recipe, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
+    def _finished(self, work: Work[Given], recipe: Given, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
         source = iter(batches)
         running: dict[str, tuple[Task, ...]] = {}
         queue = self._distributed.as_completed([], loop=self._client.loop)

@@ -186,7 +186,7 @@ class IconRun:
         self.journal.add({"key": key, "made": record["key"], "file": self.waves[name]})
 
     def _do(
-        self, pool: Pool, work: Work, recipe: Recipe, tasks: Iterable[Task], label: str, total: int, batch: int
+        self, pool: Pool, work: Work[Recipe], recipe: Recipe, tasks: Iterable[Task], label: str, total: int, batch: int
     ) -> Iterator[list[dict[str, Any]]]:
         """Records of the tasks that are not in the journal yet; of lost ones only the problem is kept."""
         with icon_progress(label, total) as step:

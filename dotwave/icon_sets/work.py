@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Record = dict[str, Any]
+Given = TypeVar("Given")
 
 PACKAGES = ("chainsim", "dotwave", "drivers", "encoders", "planner")
 # Digits kept of a similarity, and of a predicted error in units of full scale.
@@ -176,7 +177,7 @@ def write_waves(recipe: Recipe, tasks: Sequence[Task]) -> Iterator[Record]:
 
 
 def all_of_batch(
-    work: Callable[[Recipe, Sequence[Task]], Iterable[Record]], recipe: Recipe, tasks: Sequence[Task]
+    work: Callable[[Given, Sequence[Task]], Iterable[Record]], recipe: Given, tasks: Sequence[Task]
 ) -> list[Record]:
     """All records of a batch at once, for where they cannot be had one by one."""
     return list(work(recipe, tasks))

@@ -90,8 +90,9 @@ class PictureReport:
 
 @dataclass(frozen=True, repr=False)
 class PictureScene(Scene):
-    """A scene made of a picture, with its report; `frames` is a tuple."""
+    """A scene made of a picture, with its report."""
 
+    frames: tuple[Frame, ...]
     report: PictureReport = field(kw_only=True)
 
 

@@ -7,7 +7,7 @@ import time
 import tracemalloc
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Run = Callable[[], list[Response]]
 Price = Callable[[Run], tuple[list[Response], float]]
+Answers = TypeVar("Answers")
 """Makes a run, and gives its answers and what they cost in seconds."""
 
 REPEATS, LONG_S = 3, 0.3
@@ -155,7 +156,7 @@ def _told(row: TradeoffRow) -> str:
     return f"{row.rung}{asked} reaches {row.error:.1e} in {seconds_words(row.seconds)}"
 
 
-def by_clock(run: Run, clock: Callable[[], float] = time.perf_counter) -> tuple[list[Response], float]:
+def by_clock(run: Callable[[], Answers], clock: Callable[[], float] = time.perf_counter) -> tuple[Answers, float]:
     """The price of a run by the clock: the best of a few; a long one is made once."""
     seconds = math.inf
     for _ in range(REPEATS):

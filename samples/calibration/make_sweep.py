@@ -20,10 +20,12 @@ DRIVES_V = (0.15, 0.6)
 FREQUENCIES_HZ = np.round(np.linspace(128.0, 138.0, 61), 3)
 TOL = 1e-8
 
+Complexes = NDArray[np.complex128]
 
-def followed(chain: Chain, frequencies: NDArray[np.float64], epsilon: float, lam: list[float]) -> list[NDArray]:
+
+def followed(chain: Chain, frequencies: NDArray[np.float64], epsilon: float, lam: list[float]) -> list[Complexes]:
     """Phasors at each frequency in turn, each next to the one before; a jump where that has no neighbour."""
-    found: list[NDArray] = []
+    found: list[Complexes] = []
     f0 = load_device("linked-6x6").f0_hz
     for frequency in frequencies:
         setting = Setting.of(chain, epsilon=epsilon, lam=[lam], omega=frequency / f0)
@@ -34,7 +36,7 @@ def followed(chain: Chain, frequencies: NDArray[np.float64], epsilon: float, lam
     return found
 
 
-def _unlike(here: NDArray, before: NDArray) -> bool:
+def _unlike(here: Complexes, before: Complexes) -> bool:
     return bool(np.abs(here - before).max() > 0.5 * np.abs(before).max())
 
 

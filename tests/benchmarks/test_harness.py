@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,14 +14,15 @@ import pytest
 
 from dotwave.errors import AppError
 from dotwave.studies.bench import BenchReport, run_bench
+from tests.support.known import known
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 
 def module(name):
     spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", FOLDER / f"{name}.py")
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
+    made = importlib.util.module_from_spec(known(spec))
+    known(known(spec).loader).exec_module(made)
     return made
 
 
@@ -43,7 +45,7 @@ PEERS = {
     "pyHarm-os": {"missing": "not installed"},
     "numbalsoda": {"missing": "not installed either"},
 }
-FOUND = {
+FOUND: dict[str, Any] = {
     "quick": False, "load_before": 0.1, "load_after": 0.2,
     "steady": {"settings": 100, "wall_s": 0.01, "cpu_s": 0.02, "largest_error": 1e-8},
     "one_alone": {"wall_s": 2e-3, "cpu_s": 1e-3},
@@ -80,9 +82,9 @@ def test_the_picture_shows_every_peer_also_the_missing():
     words = [each.text for each in (*picture.iter(f"{space}text"), *picture.iter(f"{space}tspan"))]
     for word in ("SciPy", "pyHarm-os", "not installed", "1e+04", "10", "40", "grid: n^1.30, 0.01 s at 10,000"):
         assert word in words, word
-    bars = [float(each.get("width")) for each in picture.iter(f"{space}rect") if each.get("x")]
+    bars = [float(each.attrib["width"]) for each in picture.iter(f"{space}rect") if each.get("x")]
     assert bars[0] == 4 * bars[1]
-    first, second = (each.get("points").split() for each in list(picture.iter(f"{space}polyline"))[:2])
+    first, second = (each.attrib["points"].split() for each in list(picture.iter(f"{space}polyline"))[:2])
     assert len(first) == len(second) == 2
 
 

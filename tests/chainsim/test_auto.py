@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from chainsim import Chain, Outcome, Setting, balance_near, solve, steady_from_rest
 
@@ -46,7 +47,7 @@ def error_over_estimate(response, truth):
     return (away / size - max(10 * truth.error_estimate[0], 1e-12)) / response.error_estimate[0]
 
 
-def judged(seed, count, true_answer):
+def judged(seed, count, true_answer) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Error over estimate of every answer that is ok, and whether each estimate meets its tolerance."""
     rng, ratios, met = np.random.default_rng(seed), [], []
     for _ in range(count):

@@ -1,10 +1,12 @@
 """Branches and folds by continuation, against the closed form of one harmonic and against the solvers."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chainsim import Chain, Outcome, Setting, solve
+from chainsim import Chain, Closure, Outcome, Setting, solve
 from chainsim.averaging.settle import reached
 from chainsim.continuation.path import ContinuationError, Ending, continue_branch
 
@@ -96,7 +98,7 @@ def test_a_preload_brings_means_and_even_harmonics():
 
 
 def test_the_papers_ring_is_lost_below_a_drive():
-    chain = Chain(6, 5.3006e-3, -1.0, "ring")
+    chain = Chain(6, 5.3006e-3, -1.0, Closure.RING)
     setting = Setting.of(chain, epsilon=3e-3, lam=6.131e-3, omega=1.0)
     begin = solve(chain, setting, tol=1e-8)
     assert begin.outcome[0] == Outcome.OK
@@ -135,7 +137,7 @@ def test_too_few_points_are_said():
 
 def test_bad_questions_are_named():
     chain = Chain(2, 0.01, -1.0)
-    good = {"parameter": "epsilon", "stop": 1e-2, "harmonics": 3, "step": 0.1, "max_points": 10}
+    good: dict[str, Any] = {"parameter": "epsilon", "stop": 1e-2, "harmonics": 3, "step": 0.1, "max_points": 10}
     one = Setting.of(chain, epsilon=1e-4, lam=0.01, omega=1.0)
     bad = {"parameter": "beta", "stop": np.nan, "harmonics": 2, "step": 0.0, "max_points": 1}
     for name, value in bad.items():

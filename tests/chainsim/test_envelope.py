@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
-from chainsim import Chain, GridIntegrator, Outcome, Setting, Start, solve
+from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, Start, solve
 from chainsim.averaging.envelope import EnvelopeError, follow
 from chainsim.averaging.rung import EnvelopeRung
 from chainsim.averaging.settle import reached, strongest_line
@@ -138,7 +138,7 @@ def test_the_fixed_point_ends_as_the_harmonic_balance():
 
 
 def test_verdicts_on_the_papers_ring_agree_with_the_full_equations():
-    chain = Chain(6, 5.3006e-3, -1.0, "ring")
+    chain = Chain(6, 5.3006e-3, -1.0, Closure.RING)
     setting = Setting.of(chain, epsilon=[6e-4, 1.2e-3, 2e-3, 3e-3], lam=6.131e-3, omega=1.0)
     mine, truth = locking(chain, setting, start="rest"), solve(chain, setting, tol=1e-6, rung="ode")
     assert list(mine.outcome) == list(truth.outcome)
@@ -150,7 +150,7 @@ def test_verdicts_on_the_papers_ring_agree_with_the_full_equations():
 
 
 def test_the_beat_is_the_one_of_the_full_equations():
-    chain = Chain(6, 5.3006e-3, -1.0, "ring")
+    chain = Chain(6, 5.3006e-3, -1.0, Closure.RING)
     setting = Setting.of(chain, epsilon=1.2e-3, lam=6.131e-3, omega=1.0)
     found = locking(chain, setting, start="rest")
     grid = GridIntegrator(

@@ -5,10 +5,11 @@ import warnings
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from chainsim import Chain, Outcome, RungError, Setting, reached_from_rest, solve, steady_from_rest
+from chainsim import Chain, Closure, Outcome, RungError, Setting, reached_from_rest, solve, steady_from_rest
 from chainsim.averaging.envelope import EnvelopeError, follow, slow_refusal
 from chainsim.averaging.linear import exponential, solvent
 from chainsim.averaging.rung import EnvelopeRung
@@ -49,7 +50,7 @@ def test_a_transient_from_rest_is_of_second_order(closure, rows, bias):
     assert errors[1] < 0.35 * errors[0]
 
 
-SYSTEMS = {
+SYSTEMS: dict[str, tuple[Chain, dict[str, ArrayLike], float]] = {
     "bidirectional": (Chain.of(4, delta=0.03, beta=-1.0, closure="bidirectional"), {"lam": 0.05, "omega": 1.02}, 1e-7),
     "grid": (Chain.of(6, delta=0.03, beta=-1.0, rows=2), {"lam": 0.1, "lam_y": 0.2, "omega": 1.1}, 5e-5),
     "amplifiers, biased": (
@@ -63,7 +64,7 @@ SYSTEMS = {
         1e-4,
     ),
     "biased": (Chain(3, 0.05, -1.0), {"lam": 0.2, "omega": 1.1, "bias": [0.1, -0.05, 0.1], "preload": 0.05}, 1e-3),
-    "ring": (Chain(5, 0.03, 1.0, "ring"), {"lam": 0.01, "omega": 1.01}, 5e-6),
+    "ring": (Chain(5, 0.03, 1.0, Closure.RING), {"lam": 0.01, "omega": 1.01}, 5e-6),
 }
 
 

@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numpy.typing import ArrayLike
 
 from chainsim import Chain, Outcome, Setting, solve
 from chainsim.batch.sweep import OUTCOMES, sweep
@@ -12,7 +13,10 @@ from chainsim.batch.sweep import OUTCOMES, sweep
 OK = OUTCOMES.index(Outcome.OK)
 
 
-def random_grid(rows, cols, size, *, seed, epsilon=(1e-3, 1e-2), omega=(0.9, 1.3), delta=0.05, beta=-1.0):
+def random_grid(
+    rows, cols, size, *, seed,
+    epsilon: tuple[float, float] = (1e-3, 1e-2), omega: tuple[float, float] = (0.9, 1.3), delta=0.05, beta=-1.0,
+):  # fmt: skip
     rng = np.random.default_rng(seed)
     chain = Chain(rows * cols, delta, beta, rows=rows)
     return chain, Setting.of(
@@ -26,7 +30,7 @@ def test_a_grid_whose_links_share_one_strength_is_a_chain_along_its_diagonals():
     share = np.random.default_rng(1).uniform(0.3, 0.7, (rows, cols))
     share[0], share[:, 0] = 1.0, 0.0
     grid, line = Chain(rows * cols, 5.3e-3, -1.0, rows=rows), Chain(rows + cols - 1, 5.3e-3, -1.0)
-    links = {"lam": 0.3 * share[:, 1:], "lam_y": 0.3 * (1 - share[1:])}
+    links: dict[str, ArrayLike] = {"lam": 0.3 * share[:, 1:], "lam_y": 0.3 * (1 - share[1:])}
     found = sweep(grid, Setting.of(grid, epsilon=1e-2, omega=1.1, **links), tol=1e-6, from_rest=False)
     wanted = sweep(line, Setting.of(line, epsilon=1e-2, omega=1.1, lam=0.3), tol=1e-6, from_rest=False)
     diagonal = np.add.outer(np.arange(rows), np.arange(cols)).ravel()
@@ -126,7 +130,7 @@ def test_a_grid_without_columns_to_the_right_is_a_chain_downwards():
 
 
 N = 4
-NOT_PLAIN = {
+NOT_PLAIN: dict[str, tuple[Chain, dict[str, ArrayLike]]] = {
     "amplifier": (Chain.of(N, delta=0.05, beta=-1.0, kind="amplifier"), {}),
     "ring": (Chain.of(N, delta=0.05, beta=-1.0, closure="ring"), {}),
     "both ways": (Chain.of(N, delta=0.05, beta=-1.0, closure="bidirectional"), {}),
@@ -144,7 +148,7 @@ NOT_PLAIN = {
 @pytest.mark.parametrize("name", NOT_PLAIN)
 def test_what_is_not_plain_is_answered_as_by_solve(name, from_rest):
     chain, more = NOT_PLAIN[name]
-    question = {"epsilon": [1e-2, 2e-2, 4e-2], "omega": 1.1, "lam": 0.04}
+    question: dict[str, ArrayLike] = {"epsilon": [1e-2, 2e-2, 4e-2], "omega": 1.1, "lam": 0.04}
     setting = Setting.of(chain, **question, **more)
     found = sweep(chain, setting, tol=1e-6, from_rest=from_rest)
     wanted = solve(chain, setting, tol=1e-6, rung="auto" if from_rest else "harmonic_balance")
@@ -152,7 +156,7 @@ def test_what_is_not_plain_is_answered_as_by_solve(name, from_rest):
     for field in ("phasor", "third", "mean", "multipliers", "branch", "stable", "error_estimate"):
         assert np.array_equal(getattr(found, field), getattr(wanted, field), equal_nan=True), field
     plain = Chain(N, 0.05, -1.0, rows=chain.rows)
-    links = {"lam_y": 0.04} if chain.rows > 1 else {}
+    links: dict[str, ArrayLike] = {"lam_y": 0.04} if chain.rows > 1 else {}
     other = sweep(plain, Setting.of(plain, **question, **links), tol=1e-6, from_rest=False)
     both = (found.code == OK) & (other.code == OK)
     assert both.any()

@@ -210,11 +210,11 @@ def test_energy_stays_bounded_over_a_million_periods():
     network = Network(
         one, nothing, nothing, 0, nothing, np.zeros((1, 2)), np.array([2 * np.pi]), np.zeros(1), -np.ones(1), False
     )
-    state, table, errors = np.array([[0.5, 0.0]]), forcing_table(8), []
+    state, table, ratios = np.array([[0.5, 0.0]]), forcing_table(8), []
     for _ in range(100):
         advance_network(state, np.zeros(1, dtype=np.int64), network, table, 0, 80_000, np.zeros(1))
-        errors.append(energy(state[0, 0], state[0, 1], -1.0) / energy(0.5, 0.0, -1.0) - 1)
-    errors = np.array(errors)
+        ratios.append(energy(state[0, 0], state[0, 1], -1.0) / energy(0.5, 0.0, -1.0) - 1)
+    errors = np.array(ratios)
     assert np.abs(errors).max() <= 1e-4
     # No drift: the second half is no worse than the first.
     assert np.abs(errors[50:]).max() <= 2 * np.abs(errors[:50]).max() + 1e-9

@@ -6,8 +6,9 @@ from itertools import pairwise, zip_longest
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numpy.typing import NDArray
 
-from chainsim import Chain, Outcome, RungError, Setting, solve
+from chainsim import Chain, Closure, Outcome, RungError, Setting, solve
 from chainsim.equations.basis import basis_for
 from chainsim.equations.scaled_chain import ScaledChain
 from chainsim.harmonic_balance.joint import newton_joint
@@ -33,7 +34,7 @@ def by_chance(chain, setting, count, seed):
     start[:, 0], start[:, 1] = size * np.cos(angle), size * np.sin(angle)
     with np.errstate(all="ignore"):
         solved = newton_joint(scaled.pick(np.zeros(count, dtype=np.intp)), basis, start)
-    found = []
+    found: list[NDArray[np.complex128]] = []
     for phasor in (solved.x[:, 0] + 1j * solved.x[:, 1])[:, solved.ok].T:
         if all(np.abs(phasor - other).max() > 1e-5 * np.abs(phasor).max() for other in found):
             found.append(phasor)
@@ -157,7 +158,7 @@ def test_what_is_reached_is_a_stable_one_of_them(closure):
 
 
 def test_without_a_closing_link_a_ring_is_the_open_chain():
-    ring, chain = Chain(3, DELTA, -1.0, "ring"), Chain(3, DELTA, -1.0)
+    ring, chain = Chain(3, DELTA, -1.0, Closure.RING), Chain(3, DELTA, -1.0)
     place = {"epsilon": 2e-3, "omega": 0.99}
     every = listed(ring, Setting.of(ring, lam=[0.0, 6e-3, 6e-3], **place))
     tree = solve(chain, Setting.of(chain, lam=6e-3, **place), tol=1e-7, rung="harmonic_balance", start="all")
@@ -168,9 +169,9 @@ def test_without_a_closing_link_a_ring_is_the_open_chain():
 
 
 def test_oscillators_behind_a_cut_link_rest():
-    chain = Chain(4, DELTA, -1.0, "bidirectional")
+    chain = Chain(4, DELTA, -1.0, Closure.BIDIRECTIONAL)
     every = listed(chain, Setting.of(chain, epsilon=4e-3, lam=[1e-2, 0.0, 1e-2], omega=0.985))
-    pair = Chain(2, DELTA, -1.0, "bidirectional")
+    pair = Chain(2, DELTA, -1.0, Closure.BIDIRECTIONAL)
     alone = listed(pair, Setting.of(pair, **BELOW))
     assert every.complete
     assert every.response.phasor[:, :2] == pytest.approx(alone.response.phasor, rel=1e-7)
@@ -181,13 +182,13 @@ def test_oscillators_behind_a_cut_link_rest():
 def test_beta_is_a_length_scale(beta):
     answers = []
     for value in (-1.0, beta):
-        chain, size = Chain(3, DELTA, value, "ring"), 1 / np.sqrt(-value)
+        chain, size = Chain(3, DELTA, value, Closure.RING), 1 / np.sqrt(-value)
         answers.append(listed(chain, Setting.of(chain, **{**BELOW, "epsilon": 4e-3 * size})).response.phasor / size)
     assert answers[1] == pytest.approx(answers[0], rel=1e-7)
 
 
 def test_constant_forces_leave_the_list_open():
-    chain = Chain(2, DELTA, -1.0, "ring")
+    chain = Chain(2, DELTA, -1.0, Closure.RING)
     plain = listed(chain, Setting.of(chain, **BELOW))
     every = listed(chain, Setting.of(chain, bias=[0.0, 1e-3], **BELOW))
     assert not every.complete
@@ -197,7 +198,7 @@ def test_constant_forces_leave_the_list_open():
 
 def test_equilibria_of_a_ring():
     """z + beta z^3 = lam (z_other - z) + b: equal oscillators under equal biases may rest alike, at three places."""
-    chain = Chain(2, 0.01, -1.0, "ring")
+    chain = Chain(2, 0.01, -1.0, Closure.RING)
     every = listed(chain, Setting.of(chain, epsilon=0, lam=0.1, omega=1, bias=0.2), "static", 1e-9)
     alike = np.sort(np.roots([-1, 0, 1, -0.2]).real)
     both = every.response.mean[np.abs(np.ptp(every.response.mean, axis=1)) < 1e-9, 0]
@@ -228,13 +229,13 @@ def test_extremes_end_in_outcomes(closure, place):
 
 
 def test_long_chains_stay_within_the_budget():
-    chain = Chain(40, DELTA, -1.0, "bidirectional")
+    chain = Chain(40, DELTA, -1.0, Closure.BIDIRECTIONAL)
     assert len(listed(chain, Setting.of(chain, epsilon=1e-4, lam=6e-3, omega=1.02)).response) >= 1
 
 
 def test_refusals():
-    ring = Chain(2, DELTA, -1.0, "ring")
+    ring = Chain(2, DELTA, -1.0, Closure.RING)
     with pytest.raises(RungError, match="does not list every branch; use rung harmonic_balance"):
         joint_branches(ring, Setting.of(ring, **BELOW), tol=1e-6, rung="envelope")
     with pytest.raises(RungError, match="one setting"):
-        joint_branches(ring, Setting.of(ring, **{**BELOW, "omega": [0.9, 1.0]}), tol=1e-6, rung="one_harmonic")
+        joint_branches(ring, Setting.of(ring, **BELOW | {"omega": [0.9, 1.0]}), tol=1e-6, rung="one_harmonic")

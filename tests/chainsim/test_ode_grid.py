@@ -1,5 +1,7 @@
 """The grid under sampled forces: against exact answers, other integrators, and itself cut into blocks."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -93,7 +95,7 @@ def test_unequal_actuators_agree_with_dop853(ring):
         assert np.max(np.abs(z[:, *at] - wanted)) < 1e-7 * np.max(np.abs(wanted))
 
 
-WIRED = {
+WIRED: dict[str, dict[str, Any]] = {
     "both ways": {"both_ways": True},
     "amplifier": {"kind": "amplifier"},
     "amplifier ring": {"kind": "amplifier", "ring": True},
@@ -203,7 +205,11 @@ def test_wirings_that_are_not(how, complaint):
 def test_equal_actuators_may_be_given_one_by_one():
     force, lam = smooth(200, (2, 6))
     plain = grid((2, 6), 3).advance(force, lam)
-    alike = {"delta": np.full((2, 6), 0.02), "beta": np.full((2, 6), -1.0), "stiffness": np.ones((2, 6))}
+    alike: dict[str, Any] = {
+        "delta": np.full((2, 6), 0.02),
+        "beta": np.full((2, 6), -1.0),
+        "stiffness": np.ones((2, 6)),
+    }
     each = GridIntegrator(shape=(2, 6), chain_length=3, ring=False, dtau=0.2, **alike)
     np.testing.assert_array_equal(each.advance(force, lam), plain)
     alike["stiffness"][1, 5] += 1e-12

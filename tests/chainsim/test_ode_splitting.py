@@ -1,5 +1,7 @@
 """The composition: its coefficients, its order, and its flow, against independent answers."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -73,14 +75,14 @@ def fitted_order(errors):
 
 
 def test_order_is_four_when_kicks_are_large():
-    settings = {"periods": 3, "epsilon": 0.3, "beta": 1.0}
+    settings: dict[str, Any] = {"periods": 3, "epsilon": 0.3, "beta": 1.0}
     reference = transient(steps=1024, **settings)[0]
     errors = [np.max(np.abs(transient(steps=s, **settings)[0] - reference)) for s in (32, 64)]
     assert fitted_order(errors) == pytest.approx(4, abs=0.3)
 
 
 def test_order_is_eight_for_a_weak_force_alone():
-    settings = {"periods": 3, "epsilon": 1e-3, "beta": 0.0}
+    settings: dict[str, Any] = {"periods": 3, "epsilon": 1e-3, "beta": 0.0}
     reference = transient(steps=256, **settings)[0]
     errors = [np.max(np.abs(transient(steps=s, **settings)[0] - reference)) for s in (4, 8)]
     assert fitted_order(errors) == pytest.approx(8, abs=0.5)
@@ -90,20 +92,28 @@ def test_order_is_eight_for_a_weak_force_alone():
 @pytest.mark.parametrize("beta", [-1.0, 0.0, 1.0])
 def test_agrees_with_dop853(ring, beta):
     # Damped enough for the ring to be stable.
-    settings = {"periods": 20, "epsilon": 3e-2, "lam": 0.15, "beta": beta, "delta": 0.3, "n": 3, "ring": ring}
+    settings: dict[str, Any] = {
+        "periods": 20,
+        "epsilon": 3e-2,
+        "lam": 0.15,
+        "beta": beta,
+        "delta": 0.3,
+        "n": 3,
+        "ring": ring,
+    }
     wanted = dop853(**settings)
     assert np.max(np.abs(transient(steps=512, **settings)[0] - wanted)) < 5e-10 * np.max(np.abs(wanted))
 
 
 def test_eight_steps_reach_a_millionth():
-    settings = {"periods": 300, "epsilon": 4e-4, "lam": 6.131e-3, "delta": 6.1e-3, "omega": 1.0, "n": 6}
+    settings: dict[str, Any] = {"periods": 300, "epsilon": 4e-4, "lam": 6.131e-3, "delta": 6.1e-3, "omega": 1.0, "n": 6}
     coarse, fine = transient(steps=8, **settings)[0], transient(steps=64, **settings)[0]
     apart = np.hypot(*(coarse - fine).reshape(2, 6)) / np.hypot(*fine.reshape(2, 6))
     assert np.max(apart) < 1e-6
 
 
 def test_a_lane_does_not_depend_on_its_neighbours():
-    settings = {"steps": 8, "periods": 50, "lam": 0.1, "n": 4}
+    settings: dict[str, Any] = {"steps": 8, "periods": 50, "lam": 0.1, "n": 4}
     alone = transient(**settings)
     many = transient(lanes=37, **settings)
     assert np.array_equal(many, np.tile(alone, (37, 1)))

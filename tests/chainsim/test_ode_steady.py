@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import Branch, Chain, Outcome, Setting, solve
+from chainsim import Branch, Chain, Closure, Outcome, Setting, solve
 from chainsim.rung import RungError, Start
 from chainsim.time_domain.ode import OdeRung, reached_from_rest, steady_from_rest
 
@@ -104,7 +104,7 @@ def test_linear_chain_is_the_product_of_stage_gains():
 
 def test_a_linear_ring_escapes_just_above_its_threshold():
     # Modes 60 degrees apart: delta^2 (1 + lam (1 - cos phi)) = lam^2 sin^2 phi; the paper's 6.13e-3.
-    ring = Chain(n=6, delta=5.3006e-3, beta=0.0, closure="ring")
+    ring = Chain(n=6, delta=5.3006e-3, beta=0.0, closure=Closure.RING)
     phi = np.pi / 3
     a, b = np.sin(phi) ** 2, ring.delta**2 * (1 - np.cos(phi))
     threshold = (b + np.sqrt(b**2 + 4 * a * ring.delta**2)) / (2 * a)
@@ -172,7 +172,7 @@ def test_slow_settling_is_not_taken_for_beating():
 
 @pytest.mark.parametrize("epsilon", [6e-4, 8e-4])
 def test_the_paper_ring_beats_at_middle_drive(epsilon):
-    ring = Chain(n=6, delta=5.3006e-3, beta=-1.0, closure="ring")
+    ring = Chain(n=6, delta=5.3006e-3, beta=-1.0, closure=Closure.RING)
     setting = Setting.of(ring, epsilon=epsilon, lam=6.131e-3, omega=1.0)
     assert steady_from_rest(ring, setting, tol=1e-8, max_periods=BUDGET).outcome[0] is Outcome.NOT_LOCKED
 

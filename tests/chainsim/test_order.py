@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import DEFLECTION, RUNGS, TERMS, VIBRATION, Chain, Outcome, Setting, Start, balance_near, load_rung, solve
+from chainsim import (
+    DEFLECTION,
+    RUNGS,
+    TERMS,
+    VIBRATION,
+    Chain,
+    Closure,
+    Outcome,
+    Setting,
+    Start,
+    balance_near,
+    load_rung,
+    solve,
+)
 
 CHAIN = Chain(3, 0.05, -1.0)
 
@@ -107,7 +120,7 @@ def test_every_rung_states_its_claims(name):
 
 
 def test_an_undriven_chain_has_the_equilibrium_of_static_in_every_steady_rung():
-    for closure in ("open", "ring", "bidirectional"):
+    for closure in Closure:
         for beta in (-1.0, 1.0, 30.0):
             chain = Chain(4, 0.05, beta, closure)
             length = np.sqrt(abs(beta))
@@ -239,7 +252,7 @@ def test_multipliers_of_coupled_oscillators_far_from_the_drive(closure, delta, o
 def test_multipliers_from_the_frozen_system_are_those_of_the_steps(monkeypatch):
     from chainsim.floquet import monodromy
 
-    chain = Chain(4, 0.02, -1.0, "ring")
+    chain = Chain(4, 0.02, -1.0, Closure.RING)
     setting = Setting.of(chain, epsilon=0.1, lam=0.03, omega=0.01)
     steps = solve(chain, setting, tol=1e-6, rung="harmonic_balance")
     monkeypatch.setattr(monodromy, "MANY_SWINGS", 1.0)

@@ -1,5 +1,7 @@
 """Exact answers and invariants of the steady rungs."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -75,7 +77,7 @@ def test_the_size_of_beta_is_only_a_scale_of_length(rung, strength):
 @given(rung=st.sampled_from(STEADY), closure=st.sampled_from(list(Closure)), power=st.integers(-30, 30))
 def test_a_power_of_four_in_beta_changes_not_a_bit(rung, closure, power):
     plain, strong = Chain(4, 0.01, -1.0, closure), Chain(4, 0.01, -(4.0**power), closure)
-    forces = {"epsilon": 2e-3, "preload": 0.01, "bias": np.array([0.0, 0.01, -0.02, 0.0])}
+    forces: dict[str, Any] = {"epsilon": 2e-3, "preload": 0.01, "bias": np.array([0.0, 0.01, -0.02, 0.0])}
     less = {name: value / 2.0**power for name, value in forces.items()}
     a = solve(plain, Setting.of(plain, **forces, lam=0.006, omega=1.03), tol=1e-9, rung=rung)
     b = solve(strong, Setting.of(strong, **less, lam=0.006, omega=1.03), tol=1e-9, rung=rung)

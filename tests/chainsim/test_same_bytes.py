@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -57,10 +58,12 @@ def test_a_changed_helper_is_a_changed_kernel():
     from chainsim.batch.chains import march_blocks
     from chainsim.time_domain.linked_kernels import advance_linked
 
-    assert {name for name, _, _ in sources_stamp(march_blocks.py_func)} == {
+    march: Any = march_blocks
+    advance: Any = advance_linked
+    assert {name for name, _, _ in sources_stamp(march.py_func)} == {
         "balance.py", "chains.py", "multipliers.py",
     }  # fmt: skip
-    for name, changed, size in sources_stamp(advance_linked.py_func):
+    for name, changed, size in sources_stamp(advance.py_func):
         stat = (Path(__file__).parents[2] / "chainsim" / "time_domain" / name).stat()
         assert (changed, size) == (stat.st_mtime_ns, stat.st_size)
-    assert march_blocks._cache._cache_file._source_stamp == sources_stamp(march_blocks.py_func)
+    assert march._cache._cache_file._source_stamp == sources_stamp(march.py_func)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ KEYS = [
     "outcome", "rung", "phasor", "phase_step_deg", "third", "mean", "stable", "locked", "multipliers", "branch",
     "error_estimate", "stats",
 ]  # fmt: skip
-SPEC = {
+SPEC: dict[str, Any] = {
     "chain": {"n": 6, "delta": 5.3006e-3, "beta": -1.0, "closure": "open"},
     "setting": {"epsilon": 1.175e-4, "lam": 6.131e-3, "omega": 1.0},
     "rung": "auto",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from chainsim import Chain, Setting
+from chainsim import Chain, Closure, Setting
 from chainsim.continuation.spectrum import (
     SpectrumError,
     critical_lam,
@@ -21,7 +21,7 @@ DELTA = 5.3006e-3
 
 
 def growth(n, delta, lam):
-    chain = Chain(n, delta, -1.0, "ring")
+    chain = Chain(n, delta, -1.0, Closure.RING)
     return rest_eigenvalues(chain, Setting.of(chain, epsilon=0, lam=lam, omega=1))[:, 0].real
 
 
@@ -57,7 +57,7 @@ def test_gain_per_stage_passes_one_where_the_curve_crosses(delta, ratio):
 
 @given(st.integers(3, 12), st.floats(1e-3, 0.3), st.floats(1e-3, 1.0))
 def test_a_uniform_ring_lies_on_the_curve(n, delta, lam):
-    chain = Chain(n, delta, -1.0, "ring")
+    chain = Chain(n, delta, -1.0, Closure.RING)
     found = rest_eigenvalues(chain, Setting.of(chain, epsilon=0, lam=lam, omega=1))[0]
     wanted = spectrum_curve(delta, lam, 2 * np.pi * np.arange(n) / n).ravel()
     apart = np.abs(found[:, None] - wanted).min(axis=1)

@@ -7,6 +7,7 @@ import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_csv_of_too_many_numbers_is_refused(tmp_path: Path, monkeypatch: pytest.
     assert "a table has at most 100" in refused(path)
 
 
-def saved(path: Path, **arrays: object) -> Path:
+def saved(path: Path, **arrays: Any) -> Path:
     np.savez(path, **arrays)
     return path
 

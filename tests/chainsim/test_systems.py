@@ -1,5 +1,7 @@
 """Rings, two-way chains, grids, amplifiers and unequal oscillators, each against DOP853 of the equations as written."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -20,7 +22,7 @@ from chainsim import (
 
 DELTAS, BETAS = [0.10, 0.14, 0.08, 0.12, 0.11, 0.09], [-1.0, -0.5, 0.0, 0.8, -1.5, -1.0]
 OWN = [1, 1.02, 0.97, 1.1, 1, 0.9]
-SYSTEMS = {
+SYSTEMS: dict[str, dict[str, Any]] = {
     "open": {},
     "ring": {"closure": "ring"},
     "bidirectional": {"closure": "bidirectional"},
@@ -39,7 +41,7 @@ each_system = pytest.mark.parametrize("name", list(SYSTEMS))
 
 
 def built(name, **more):
-    given = {"delta": 0.1, "beta": -1.0, **SYSTEMS[name]}
+    given: dict[str, Any] = {"delta": 0.1, "beta": -1.0, **SYSTEMS[name]}
     chain = Chain.of(6, **given)
     rng = np.random.default_rng(5)
     count = (chain.rows, chain.cols - 1) if chain.rows > 1 else 5 + (chain.closure == "ring")
@@ -51,7 +53,7 @@ def built(name, **more):
 
 def slope_of(name, chain, setting):
     """The equations of motion, a link at a time, straight from their definition."""
-    given = {"delta": 0.1, "beta": -1.0, "stiffness": 1.0, **SYSTEMS[name]}
+    given: dict[str, Any] = {"delta": 0.1, "beta": -1.0, "stiffness": 1.0, **SYSTEMS[name]}
     delta, beta, own = (np.broadcast_to(np.array(given[key], float), 6) for key in ("delta", "beta", "stiffness"))
     back = given.get("kind") != "amplifier"
     links = []
@@ -162,7 +164,7 @@ def test_equilibria_balance_their_forces(name):
 
 @each_system
 def test_without_cubic_terms_the_linear_rung_is_exact(name):
-    given = {"delta": 0.1, **SYSTEMS[name], "beta": 0.0}
+    given: dict[str, Any] = {"delta": 0.1, **SYSTEMS[name], "beta": 0.0}
     chain, (_, setting) = Chain.of(6, **given), built(name, preload=0.02)
     response = solve(chain, setting, tol=1e-12)
     assert (response.rung, response.outcome[0]) == ("linear", Outcome.OK)
@@ -236,7 +238,7 @@ def test_when_the_lower_branch_of_a_ring_is_sure_it_is_the_one_integrated():
     from chainsim.reach.rest import sure_from_rest
 
     rng = np.random.default_rng(4)
-    for closure in ("ring", "bidirectional"):
+    for closure in (Closure.RING, Closure.BIDIRECTIONAL):
         chain = Chain(4, 0.05, -1.0, closure)
         setting = Setting.of(
             chain, epsilon=np.exp(rng.uniform(np.log(1e-4), np.log(0.05), 60)), lam=rng.uniform(0.005, 0.04, (60, 1)),
@@ -268,7 +270,7 @@ def test_descriptions_that_do_not_fit_are_refused():
         Setting.of(grid, epsilon=0.1, lam=0.1, lam_y=[0.1, 0.2], omega=1.0)
     with pytest.raises(ValueError, match=r"setting\.lam_y: only a grid"):
         Setting.of(Chain(2, 0.1, -1.0), epsilon=0.1, lam=0.1, lam_y=0.1, omega=1.0)
-    two_way = Chain(3, 0.1, -1.0, "bidirectional")
+    two_way = Chain(3, 0.1, -1.0, Closure.BIDIRECTIONAL)
     setting = Setting.of(two_way, epsilon=0.1, lam=0.1, omega=1.0)
     with pytest.raises(RungError, match="the branches of a bidirectional chain are found together: use joint_branches"):
         load_rung("harmonic_balance").solve(two_way, setting, tol=1e-6, start=Start.ALL)

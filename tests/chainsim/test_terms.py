@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
-from chainsim import Chain, Outcome, Setting, load_device, solve
+from chainsim import Chain, Closure, Outcome, Setting, load_device, solve
 from chainsim.averaging.envelope import follow
 from chainsim.effects.effects import (
     AmplifierDynamics,
@@ -38,7 +38,7 @@ def run(chain, terms=None, *, duration=300.0, step=0.05, every=4, **setting):
 
 
 def test_without_terms_it_is_the_plain_chain_to_fourth_order():
-    chain = Chain(3, 0.05, -1.0, "ring")
+    chain = Chain(3, 0.05, -1.0, Closure.RING)
     lam = np.array([0.02, 0.05, 0.03])
 
     def slope(tau, y):
@@ -293,7 +293,7 @@ GOOD = (Tone(0.1, 0.9), Tone(0.1, 1.1))
         (lambda: run(ONE, epsilon=[0.1, 0.2]), "setting"),
         (lambda: two_tones(PAIR, STILL, GOOD, order=2), "order"),
         (lambda: two_tones(PAIR, STILL, (GOOD[0], GOOD[0]), order=3), "frequencies"),
-        (lambda: two_tones(Chain(2, 0.05, -1.0, "ring"), STILL, GOOD, order=3), "open"),
+        (lambda: two_tones(Chain(2, 0.05, -1.0, Closure.RING), STILL, GOOD, order=3), "open"),
         (lambda: two_tones(PAIR, STILL, GOOD, order=3).line(2, 0), "lines"),
     ],
 )

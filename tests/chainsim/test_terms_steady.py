@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainsim import Chain, Outcome, RungError, Setting, Start, solve
+from chainsim import Chain, Closure, CouplingKind, Outcome, RungError, Setting, Start, solve
 from chainsim.continuation.locking import locking
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Play, Terms, Tone, bending_modes
 from chainsim.effects.lines import Lines
@@ -19,10 +19,10 @@ DELTA = 5.3006e-3
 SLOW = Creep(per_decade=0.1, first=2.0, last=200.0, each=1)
 CHAINS = {
     "open": Chain(3, 0.05, -1.0),
-    "ring": Chain(3, 0.05, -1.0, "ring"),
-    "bidirectional": Chain(3, 0.05, -1.0, "bidirectional"),
+    "ring": Chain(3, 0.05, -1.0, Closure.RING),
+    "bidirectional": Chain(3, 0.05, -1.0, Closure.BIDIRECTIONAL),
     "grid": Chain(4, 0.05, -1.0, rows=2),
-    "amplifier": Chain(3, 0.05, -1.0, "ring", kind="amplifier"),
+    "amplifier": Chain(3, 0.05, -1.0, Closure.RING, kind=CouplingKind.AMPLIFIER),
 }
 each_closure = pytest.mark.parametrize("name", CHAINS)
 
@@ -157,7 +157,7 @@ def test_auto_believes_the_integration_where_harmonic_balance_finds_an_orbit_tha
 
 
 def test_bouc_wen_in_a_ring_against_an_integration_of_its_own():
-    chain = Chain(2, 0.2, -1.0, "ring")
+    chain = Chain(2, 0.2, -1.0, Closure.RING)
     setting = Setting.of(chain, epsilon=0.02, lam=0.1, omega=1.0)
     model = BoucWen(gain=0.4, loading=60.0, unloading=20.0)
 
@@ -180,13 +180,14 @@ def test_bouc_wen_in_a_ring_against_an_integration_of_its_own():
 
 @pytest.mark.parametrize("beta", [0.0, -1.0])
 def test_creep_ends_where_its_relaxations_do_and_drifts_there_alike_in_every_decade(beta):
-    chain, creep, force = Chain(2, 0.3, beta, "bidirectional"), Creep(per_decade=0.02, first=80.0, last=8e4), 0.05
+    chain, creep, force = Chain(2, 0.3, beta, Closure.BIDIRECTIONAL), Creep(per_decade=0.02, first=80.0, last=8e4), 0.05
     setting = Setting.of(chain, epsilon=0.0, lam=0.0, omega=1.0, bias=[force, 2 * force])
     found = steady_with_terms(chain, setting, Terms(creep=creep), tol=1e-6, start=Start.REST)
     grown = 1 + 0.01 * len(creep.times)
     wanted = [np.sort(np.roots([beta, 0, 1, -grown * b]).real)[1 if beta else 0] for b in (force, 2 * force)]
     assert found.outcome is Outcome.OK
     assert found.mean == pytest.approx(wanted, rel=1e-6)
+    assert found.drift is not None
     assert found.drift.tau[-1] == pytest.approx(8e4, rel=1e-3)
     if not beta:
         inner = (found.drift.tau > 500) & (found.drift.tau < 4e4)
@@ -207,11 +208,12 @@ def test_a_ramp_stays_on_the_lower_branch_that_a_sudden_drive_leaves():
 
 
 def test_an_unlocked_ring_beats_as_its_envelope_does():
-    ring = Chain(3, DELTA, 1.0, "ring")
+    ring = Chain(3, DELTA, 1.0, Closure.RING)
     setting = Setting.of(ring, epsilon=5e-5, lam=1e-2, omega=1.0)
     found = steady_with_terms(ring, setting, Terms(), tol=1e-4, start=Start.REST)
     slow = locking(ring, setting, start="rest")
     assert found.outcome is slow.outcome[0] is Outcome.NOT_LOCKED
+    assert found.beat is not None
     assert found.beat.omega == pytest.approx(slow.beat[0], rel=0.02)
     assert found.beat.depth.max() == pytest.approx(slow.spread[0], rel=0.02)
     assert np.isnan(found.amplitude).all()
@@ -229,7 +231,7 @@ def test_play_without_width_is_a_spring():
 
 
 def test_tones_of_a_linear_ring_add_up():
-    ring = Chain(3, 0.05, 0.0, "ring")
+    ring = Chain(3, 0.05, 0.0, Closure.RING)
     tones = Tone(0.02, 1.03, 0.2), Tone(0.01, 0.9), Tone(0.03, 1.2, -1.0)
     setting = setting_of(ring)
     found = steady_with_terms(ring, setting, Terms(tones=tones), tol=1e-5, start=Start.REST)
@@ -296,7 +298,7 @@ def test_extremes_end_in_an_outcome(chain, setting, outcome):
 )
 def test_the_error_estimate_covers_the_error(terms):
     rng, found = np.random.default_rng(5), 0
-    for closure in ("open", "ring", "bidirectional") * 2:
+    for closure in [*Closure] * 2:
         chain = Chain(3, float(rng.uniform(0.03, 0.1)), -1.0, closure)
         place = {"epsilon": rng.uniform(1e-3, 1e-2), "lam": rng.uniform(0.01, 0.1), "omega": rng.uniform(1.0, 1.3)}
         rough, fine = (

@@ -111,9 +111,14 @@ def test_work_grows_as_the_file_does() -> None:
 def test_a_document_is_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     from chainsim.yaml_tree import _Loader
 
-    made = []
+    made: list[str] = []
     plain = _Loader.__init__
-    monkeypatch.setattr(_Loader, "__init__", lambda self, text: (made.append(text), plain(self, text))[1])
+
+    def noted(self: _Loader, text: str) -> None:
+        made.append(text)
+        plain(self, text)
+
+    monkeypatch.setattr(_Loader, "__init__", noted)
     read("words: [a]")
     assert made == ["words: [a]", ""]
 

@@ -45,7 +45,8 @@ def test_a_docstring_becomes_lists_under_bold_titles() -> None:
 
 
 def test_signatures_are_plain_and_long_ones_stand_in_lines() -> None:
-    def short(place: int, kind: Start = Start.REST) -> str: ...
+    def short(place: int, kind: Start = Start.REST) -> str:
+        return kind
 
     def long(first_of_all: dict[str, int], second_of_all: int | None = None, *, third_of_all_names: float) -> None: ...
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from numpy.typing import NDArray
 
 from chainsim import Device, load_device
 from drivers import WavWriter, channels_of, read_waveform
@@ -182,8 +183,9 @@ def test_the_budget_is_that_of_the_bus(tmp_path: Path) -> None:
     assert board.skew_s * 133 == pytest.approx(0.9, abs=0.1)
 
 
-def waves() -> np.ndarray:
-    return 10 * np.exp(-1j * np.deg2rad(60) * np.arange(6))[np.newaxis] * np.ones((6, 1))
+def waves() -> NDArray[np.complex128]:
+    found: NDArray[np.complex128] = 10 * np.exp(-1j * np.deg2rad(60) * np.arange(6))[np.newaxis] * np.ones((6, 1))
+    return found
 
 
 def test_what_the_board_cannot_do_is_refused(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -183,7 +184,12 @@ def test_thousands_of_files_do_not_look_through_the_folder_again_and_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     looks, scandir = [], os.scandir
-    monkeypatch.setattr(os, "scandir", lambda folder: looks.append(folder) or scandir(folder))
+
+    def counted(folder: Path) -> Any:
+        looks.append(folder)
+        return scandir(folder)
+
+    monkeypatch.setattr(os, "scandir", counted)
     for number in range(100):
         with atomic_files(tmp_path / f"{number}.a", tmp_path / f"{number}.b"):
             pass

@@ -99,7 +99,8 @@ def test_the_manifest_has_the_keys_of_the_design(tmp_path: Path) -> None:
 def test_a_pattern_of_chains_lies_row_by_row_in_the_target(tmp_path: Path) -> None:
     device = load("linked-40x96")
     (one, *_) = frames(device, 1)
-    states = tuple(replace(state, target=np.arange(6) + 6.0 * k) for k, state in enumerate(one.states))
+    row = np.arange(6, dtype=np.float64)
+    states = tuple(replace(state, target=row + 6.0 * k) for k, state in enumerate(one.states))
     out = replace(one, states=states)
     write_waveform(Plan(device, [out], {}), tmp_path / "x.wav")
     target = read_manifest(tmp_path / "x.json").frames[0].target

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,8 +154,8 @@ def test_a_long_line_is_not_taken_for_a_broken_one() -> None:
     assert bench.session.report.underruns == 0
 
 
-def greeted(version: int, **options: int) -> VirtualController:
-    controller = VirtualController(replace(SPEC, **options), now=0.0, recorder=Kept())  # type: ignore[arg-type]
+def greeted(version: int, **options: Any) -> VirtualController:
+    controller = VirtualController(replace(SPEC, **options), now=0.0, recorder=Kept())
     send(
         controller,
         0.0,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import dedent
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -25,6 +27,9 @@ from drivers import (
 )
 from drivers.sinks.opening import SINKS
 from drivers.waveform.manifest import digest_of
+
+if TYPE_CHECKING:
+    from tests.conftest import Ended
 
 DEVICE = load_device("paper-6x6")
 RATE = 8000
@@ -93,7 +98,7 @@ def written(folder: Path, height: float = 50.0) -> Path:
 
 
 def test_a_sink_of_another_package_is_played_to(
-    tmp_path: Path, install: Callable[..., None], dotwave: Callable[..., object]
+    tmp_path: Path, install: Callable[..., None], dotwave: Callable[..., Ended]
 ) -> None:
     install("keeping", KEEPER, keeper="keeping:Keeper")
     assert sink_names() == (*SINKS, "keeper")
@@ -101,8 +106,7 @@ def test_a_sink_of_another_package_is_played_to(
     dry = dotwave("play", path, "--to", "keeper:shelf")
     assert (dry.code, dry.err) == (0, "")
     assert "  would be kept in shelf\n  Give --live to play it." in dry.out
-    import keeping
-
+    keeping: Any = importlib.import_module("keeping")
     assert (keeping.played, keeping.closed) == ([], ["shelf"])
     live = dotwave("play", path, "--to", "keeper:shelf", "--live", "--json")
     report = json.loads(live.out)
@@ -116,15 +120,13 @@ def test_it_cannot_forget_the_gate(tmp_path: Path, install: Callable[..., None])
     manifest, reader = read_waveform(written(tmp_path, 101.0))
     with open_sink("keeper:shelf") as sink, pytest.raises(GateRefusal, match="nothing was sent: volts of channel 3"):
         sink.play(manifest, reader)
-    import keeping
-
+    keeping: Any = importlib.import_module("keeping")
     assert keeping.played == []
 
 
 def test_samples_that_change_after_the_check_stop_at_the_limit(tmp_path: Path, install: Callable[..., None]) -> None:
     install("keeping", KEEPER, keeper="keeping:Keeper")
-    import keeping
-
+    keeping: Any = importlib.import_module("keeping")
     path = written(tmp_path)
     manifest, reader = read_waveform(path)
     with open_sink("keeper:shelf") as sink:
@@ -164,7 +166,7 @@ def test_limits_that_are_known_are_held(tmp_path: Path, install: Callable[..., N
     ids=["import", "syntax", "name", "no maker", "no sink"],
 )
 def test_a_broken_package_is_one_line(
-    install: Callable[..., None], dotwave: Callable[..., object], tmp_path: Path, source: str, place: str, why: str
+    install: Callable[..., None], dotwave: Callable[..., Ended], tmp_path: Path, source: str, place: str, why: str
 ) -> None:
     install("broken", source, mine=place)
     with pytest.raises(SinkError, match=f"sink mine: .*{why}.*; reinstall or mend the package"):

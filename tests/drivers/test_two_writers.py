@@ -11,6 +11,7 @@ import pytest
 
 from drivers import atomic_files, settled
 from drivers.files.parts import part_of
+from tests.support.known import known
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks on folders")
 
@@ -68,9 +69,9 @@ def test_two_writers_at_once_leave_the_files_of_one(tmp_path: Path) -> None:
     seen = set()
     for number in range(ROUNDS):
         for writer in writers:
-            writer.stdin.write(f" {number}\n")
-            writer.stdin.flush()
-        assert [writer.stdout.readline() for writer in writers] == ["done\n"] * 2
+            known(writer.stdin).write(f" {number}\n")
+            known(writer.stdin).flush()
+        assert [known(writer.stdout).readline() for writer in writers] == ["done\n"] * 2
         assert len(words(tmp_path)) == 1
         seen |= words(tmp_path)
     for writer in writers:

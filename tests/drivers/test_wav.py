@@ -108,7 +108,7 @@ def test_round_trip_loses_what_is_stated(
     back = np.concatenate([np.empty((0, count)), *reader.blocks(block)])
     # float32: half an ulp of 24 bits, relative; PCM24: half a step of VOLTS / 2^23. The factor allows for
     # the rounding of the division and the product by VOLTS.
-    lost = {"float32": np.abs(volts) * 2.0**-24, "pcm24": VOLTS * 2.0**-24}[encoding]
+    lost = {"float32": np.abs(volts) * 2.0**-24, "pcm24": np.full(volts.shape, VOLTS * 2.0**-24)}[encoding]
     assert np.all(np.abs(back - volts) <= lost * (1 + 1e-6) + 1e-13)
 
 

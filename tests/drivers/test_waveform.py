@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from drivers.waveform.coupling import CouplingWriter, LamTrack
 from drivers.waveform.timeline import PlacedFrame
 from encoders import Frame
 from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
+from tests.support.known import known
 from tests.support.plans import NAMES, PATTERN, load
 
 
@@ -111,17 +112,21 @@ def expected_volts(plan: Plan, sample: int) -> list[float]:
     since, tau = t - current.start_s, 2 * math.pi * device.f0_hz * t
     drives, biases = [], []
     for held, ramp in zip(current.states, current.ramps, strict=True):
-        rising = ramp is not None and since < ramp.t_s[-1]
-        envelope = between(since, ramp.t_s, ramp.epsilon, ramp.epsilon_slope) if rising else held.epsilon
+        rising = ramp if ramp is not None and since < ramp.t_s[-1] else None
+        envelope = held.epsilon
+        if rising is not None:
+            envelope = between(since, rising.t_s, known(rising.epsilon), rising.epsilon_slope)
         hold = FirstOrderHold.of(held.omega, 2 * math.pi * device.f0_hz / rate)
         envelope *= hold.gain
-        if rising and ramp.epsilon_slope is not None:
-            slope = np.interp(since, ramp.t_s, ramp.epsilon_slope) / (2 * math.pi * device.f0_hz)
+        if rising is not None and rising.epsilon_slope is not None:
+            slope = np.interp(since, rising.t_s, rising.epsilon_slope) / (2 * math.pi * device.f0_hz)
             envelope += 1j * hold.lead * slope
         drives.append((envelope * cmath.exp(1j * held.omega * tau)).real / device.epsilon_per_volt)
         for m in range(device.chain_length if device.bias == "actuator" else 0):
-            tilt = None if ramp is None or ramp.bias_slope is None else ramp.bias_slope[:, m]
-            b = between(since, ramp.t_s, ramp.bias[:, m], tilt).real if rising else held.bias[m]
+            b = held.bias[m]
+            if rising is not None:
+                tilt = None if rising.bias_slope is None else rising.bias_slope[:, m]
+                b = between(since, rising.t_s, known(rising.bias)[:, m], tilt).real
             biases.append(b / device.bias_per_volt)
     return drives + biases
 
@@ -261,14 +266,16 @@ def test_frames_are_drawn_one_at_a_time() -> None:
         (lambda f: replace(f, ramps=(Ramp(np.array([0.0, 0.2])),) * 6), "row 0: ramp.t_s: a ramp of 0.2 s in a frame"),
         (lambda f: replace(f, ramps=(Ramp(np.array([0.1, 0.0])),) * 6), "expected times from 0 upwards"),
         (lambda f: replace(f, ramps=(Ramp(np.zeros(0)),) * 6), "ramp.t_s: expected shape"),
-        (lambda f: replace(f, ramps=(Ramp(np.zeros(2), epsilon=np.zeros(3)),) * 6), "ramp.epsilon: expected shape"),
-        (lambda f: replace(f, ramps=(Ramp(np.zeros(2), epsilon_slope=np.zeros(3)),) * 6), "ramp.epsilon_slope: expec"),
+        (lambda f: replace(f, ramps=(Ramp(np.zeros(2), np.zeros(3, complex)),) * 6), "ramp.epsilon: expected shape"),
+        (lambda f: replace(f, ramps=(Ramp(np.zeros(2), None, np.zeros(3, complex)),) * 6), "ramp.epsilon_slope: expec"),
         (lambda f: replace(f, ramps=(Ramp(np.zeros(1), lam=np.zeros((1, 5))),) * 6), "give both or neither"),
     ],
 )  # fmt: skip
-def test_a_plan_that_contradicts_itself_is_refused_with_the_place(change: object, words: str) -> None:
+def test_a_plan_that_contradicts_itself_is_refused_with_the_place(
+    change: Callable[[FramePlan], FramePlan], words: str
+) -> None:
     device = load("linked-6x6")
-    bad = change(frame(device, 0.0, 0.1, [state(device)]))  # type: ignore[operator]
+    bad = change(frame(device, 0.0, 0.1, [state(device)]))
     with pytest.raises(WaveformError, match=words) as caught:
         whole(Waveform.of(Plan(device, [bad], {})))
     assert "\n" not in str(caught.value)

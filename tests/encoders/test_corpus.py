@@ -78,7 +78,7 @@ def plain(node: yaml.Node) -> Any:
 
 def table_of(value: Any) -> str:
     if isinstance(value, dict):
-        return value.get("__assert-match", "")
+        return str(value.get("__assert-match", ""))
     return ",".join(value) if isinstance(value, list) else value if "\n" not in value else ""
 
 

@@ -1,5 +1,7 @@
 """Words on pages: nothing lost, nothing doubled, and the dots alone say where words end."""
 
+from collections.abc import Collection
+
 import pytest
 from hypothesis import example, given, settings, strategies as st
 
@@ -11,7 +13,7 @@ from encoders.braille.layout import NARROW, Cut, Layout, PlacedWord, cut_anywher
 WORD = st.text(st.sampled_from("⠁⠃⠤"), min_size=1, max_size=30)
 
 
-def words_of(cells: list[str], glued: set[int] = frozenset()) -> list[PlacedWord]:
+def words_of(cells: list[str], glued: Collection[int] = frozenset()) -> list[PlacedWord]:
     placed, at = [], 0
     for index, word in enumerate(cells):
         joined = index in glued and index > 0

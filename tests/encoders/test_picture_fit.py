@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 from PIL import Image
 
 from encoders.picture.climb import climbed, neighbours, swept
@@ -45,13 +46,14 @@ def reference(figure: np.ndarray, dots: np.ndarray) -> float:
                 up[y, x] += value * math.prod(tents)
     weight = 1 + grad / max(grad.max(), 1e-12)
 
-    def blurred(values: np.ndarray) -> np.ndarray:
+    def blurred(values: np.ndarray) -> NDArray[np.float64]:
         ways = []
         for size in values.shape:
             apart = (np.arange(size)[:, None] - np.arange(size)) / 4
             bell = np.exp(-(apart**2) / (2 * 1.5**2))
             ways.append(bell / bell.sum(axis=1, keepdims=True))
-        return ways[0] @ values @ ways[1].T
+        soft: NDArray[np.float64] = ways[0] @ values @ ways[1].T
+        return soft
 
     def correlation(a: np.ndarray, b: np.ndarray) -> float:
         cov = np.cov(a.ravel(), b.ravel(), aweights=weight.ravel(), ddof=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,8 @@ def square(size: int = 24, low: int = 8, high: int = 16) -> np.ndarray:
 
 
 def test_composite_by_hand() -> None:
-    over = composite(light(np.full((1, 2), 0.8, np.float32), np.float32([[1.0, 0.25]])), np.float32([0, 1, 0.5]))
+    alpha, ground = np.array([[1.0, 0.25]], np.float32), np.array([0, 1, 0.5], np.float32)
+    over = composite(light(np.full((1, 2), 0.8, np.float32), alpha), ground)
     np.testing.assert_allclose(over, [[[0.8, 0.8, 0.8], [0.2, 0.95, 0.575]]], atol=1e-6)
 
 
@@ -198,7 +200,8 @@ def test_two_tones_are_an_icon_and_a_slope_is_a_photograph() -> None:
 
 
 def test_options_name_the_field_and_the_value() -> None:
-    for field, value in (("zoom", 0), ("levels", 9), ("level_step_db", 2.9), ("overlap", float("nan")), ("dwell_s", 0)):
+    wrong: dict[str, Any] = {"zoom": 0, "levels": 9, "level_step_db": 2.9, "overlap": float("nan"), "dwell_s": 0}
+    for field, value in wrong.items():
         with pytest.raises(PictureError, match=rf"picture\.{field}: expected a number from .* got {value}"):
             PictureOptions(**{field: value})
     with pytest.raises(PictureError, match=r"picture\.fit: expected one of contain, cover, stretch, got 'tile'"):

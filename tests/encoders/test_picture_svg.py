@@ -35,7 +35,7 @@ def test_a_drawing() -> None:
     picture = drawn('<rect width="8" height="4" fill="#f00"/>')
     assert (picture.kind, picture.size, picture.notes) == ("SVG", (64, 64), ())
     light = picture.frames[0].light
-    np.testing.assert_array_equal(light[:32], np.broadcast_to(np.float32([1, 0, 0, 1]), (32, 64, 4)))
+    np.testing.assert_array_equal(light[:32], np.broadcast_to(np.array([1, 0, 0, 1], np.float32), (32, 64, 4)))
     np.testing.assert_array_equal(light[32:], 0)
 
 

@@ -20,6 +20,7 @@ import pytest
 from encoders import GridShape, TextOptions, back_translate, encode_text, translate
 from encoders.braille.alphabet import alphabet
 from encoders.braille.joining import unmarked
+from tests.support.known import known
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -78,7 +79,7 @@ LANGUAGES = {
 
 
 @pytest.fixture(scope="module")
-def packages(tmp_path_factory) -> Callable[[str], Path]:
+def packages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     folder = tmp_path_factory.mktemp("packages")
 
     def package(name: str) -> Path:
@@ -102,7 +103,7 @@ def blocks(package: Path, language: Language) -> Iterator[str]:
     ):
         for member in archive:
             if re.fullmatch(language.files, member.name):
-                files[member.name] = archive.extractfile(member).read()
+                files[member.name] = known(archive.extractfile(member)).read()
     for name in sorted(files):
         for block in language.read(files[name]):
             text = " ".join(block.split())

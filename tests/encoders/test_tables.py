@@ -1,6 +1,7 @@
 """Finding liblouis, its tables, and saying what is missing."""
 
 import re
+import shutil
 import subprocess
 import sys
 import types
@@ -139,14 +140,14 @@ def test_without_liblouis_the_cure_is_named(monkeypatch):
 
 @pytest.mark.parametrize("tool", louis_cure.INSTALLERS)
 def test_the_cure_is_that_of_the_package_manager(monkeypatch, tool):
-    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: f"/bin/{name}" if name == tool else None)
+    monkeypatch.setattr(shutil, "which", lambda name: f"/bin/{name}" if name == tool else None)
     assert louis_cure.install_words() == f"install it with: {louis_cure.INSTALLERS[tool]}"
 
 
 @pytest.mark.parametrize(("platform", "says"), [("darwin", "Homebrew"), ("win32", "wsl"), ("linux", "liblouis.io")])
 def test_without_a_package_manager_the_cure_is_that_of_the_system(monkeypatch, platform, says):
-    monkeypatch.setattr(louis_cure.shutil, "which", lambda name: None)
-    monkeypatch.setattr(louis_cure.sys, "platform", platform)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr(sys, "platform", platform)
     assert says in louis_cure.install_words()
     assert ("apt-get" in louis_cure.install_words()) == (platform == "win32")
 

@@ -3,6 +3,7 @@
 import itertools
 import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -169,7 +170,7 @@ def test_braille_and_brf_pass_through():
 
 
 def test_eight_dots_need_rows_of_four():
-    eight = {"table": "en-us-comp8-ext.utb"}
+    eight: dict[str, Any] = {"table": "en-us-comp8-ext.utb"}
     with pytest.raises(LayoutError, match=r"en-us-comp8-ext.utb writes 8-dot cells.*--dots 6"):
         frames_of("Hello", **eight)
     with pytest.raises(LayoutError, match="8-dot cells"):

@@ -48,9 +48,9 @@ def named_strings(tree: ast.AST) -> set[str]:
 
 
 def without_docstring(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    lines = node.end_lineno - node.lineno + 1
+    lines = (node.end_lineno or 0) - node.lineno + 1
     if ast.get_docstring(node) is not None:
-        lines -= node.body[0].end_lineno - node.body[0].lineno + 1
+        lines -= (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
     return lines
 
 

@@ -65,8 +65,8 @@ def plans() -> Iterator[list[float]]:
                 for part in (state.epsilon, state.lam, state.bias, state.omega, state.phasor, state.mean, state.error):
                     yield summed(part)
             for ramp in filter(None, frame.ramps):
-                for part in (ramp.t_s, ramp.epsilon, ramp.bias, ramp.lam):
-                    yield summed(0.0 if part is None else part)
+                for curve in (ramp.t_s, ramp.epsilon, ramp.bias, ramp.lam):
+                    yield summed(0.0 if curve is None else curve)
 
 
 def pictures() -> Iterator[list[float]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,9 +15,9 @@ LINKED = load_device("linked-6x6")
 VIBRATING = ["linked-6x6", "linked-40x96", "independent-6x6"]
 
 
-def altered(device: Device = LINKED, **changes: object) -> Device:
+def altered(device: Device = LINKED, **changes: Any) -> Device:
     """The device with other numbers: `volts`, `lam` and `omega` (pairs), or any plain field."""
-    update: dict[str, object] = dict(changes)
+    update = dict(changes)
     if "volts" in update:
         update["amplifier"] = device.amplifier.model_copy(update={"volts": update.pop("volts")})
     if "lam" in update:
@@ -106,7 +108,7 @@ def test_links_that_cannot_follow_a_change() -> None:
 @pytest.mark.parametrize("case", ["slow", "steady_volts", "ramp_volts", "lam_max", "lam_min", "step"])
 def test_giving_what_is_lacking_helps(case: str) -> None:
     device, _, cure = LACKING[case]
-    given = {
+    given: dict[str, dict[str, Any]] = {
         "volts": {"volts": 2 * device.amplifier.volts},
         "range of lam": {"lam": (0.0, 1.0)},
         "omega.max": {"omega": (0.9, 1.35)},
@@ -134,7 +136,7 @@ def test_more_contrast_costs_the_deeper_floor() -> None:
 
 
 @pytest.mark.parametrize("changes", [{"chain_length": 2}, {"chain_length": 3}, {"f0_hz": 250.0, "chain_length": 2}])
-def test_short_chains_take_the_time_they_need(changes: dict[str, object]) -> None:
+def test_short_chains_take_the_time_they_need(changes: dict[str, Any]) -> None:
     band = choose_band(altered(**changes), 20.0)
     assert band.lacking == ""
     assert band.ramp_s <= LONGEST_RAMP_S

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,17 +69,17 @@ def planned(device: Device = PAPER, **options: float) -> list[FramePlan]:
     return list(plan_scene(Scene(GridShape(6, 6), FRAMES), device, **options).frames)
 
 
-def same(one: object, other: object) -> bool:
+def same(one: Any, other: Any) -> bool:
     """Equal bit for bit, arrays included."""
     if isinstance(one, np.ndarray):
-        return one.dtype == other.dtype and np.array_equal(one, other)
+        return bool(one.dtype == other.dtype and np.array_equal(one, other))
     if isinstance(one, tuple):
         return len(one) == len(other) and all(same(a, b) for a, b in zip(one, other, strict=True))
     if isinstance(one, OperatingPoint | Ramp):
         return type(one) is type(other) and all(same(v, vars(other)[k]) for k, v in vars(one).items())
     if isinstance(one, FramePlan):
         return all(same(v, vars(other)[k]) for k, v in vars(one).items())
-    return one is other or one == other
+    return one is other or bool(one == other)
 
 
 @pytest.mark.parametrize("device", [PAPER, LINKED], ids=["paper", "linked"])
@@ -100,7 +101,7 @@ def test_everything_is_planned_once_within_a_run(work: dict[str, int]) -> None:
     assert work == {"states": len(rows), "ramps": sum(one != other for one, other in steps)}
 
 
-OTHERS = {
+OTHERS: dict[str, dict[str, Any]] = {
     "beta": {"beta": -0.9},
     "full_scale": {"full_scale": 0.12},
     "f0_hz": {"f0_hz": 140.0},

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from chainsim import Amplifier, Chain, Closure, Device, GridIntegrator, load_device
@@ -22,12 +23,15 @@ FREE = Amplifier(volts=100.0, slew_v_per_s=3e5, rate_hz=8000)
 THREE = load_device("linked-6x6").model_copy(update={"rows": 1, "cols": 3, "chain_length": 3, "amplifier": FREE})
 PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
 
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
-def nodes(seed: int, count: int, shape: tuple[int, ...] = ()) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+
+def nodes(seed: int, count: int, shape: tuple[int, ...] = ()) -> tuple[Floats, Complexes, Complexes]:
     rng = np.random.default_rng(seed)
     at = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 2.0, count - 1))])
     values, slopes = (rng.normal(size=(count, *shape)) + 1j * rng.normal(size=(count, *shape)) for _ in range(2))
-    return at, values, slopes
+    return at, values.astype(np.complex128), slopes.astype(np.complex128)
 
 
 @given(st.integers(0, 1000), st.integers(2, 9))

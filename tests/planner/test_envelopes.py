@@ -73,7 +73,8 @@ def felt_after(chain: Chain, ramp: EnvelopeRamp, start: Floats, periods: int) ->
     ran = solve_ivp(slope, (0.0, points[-1]), start, "DOP853", t_eval=points, rtol=1e-10, atol=1e-13)
     assert ran.success
     turned = ran.y[:n] * np.exp(-1j * OMEGA * points)
-    return 2 * turned.reshape(n, periods, 32).mean(axis=2).T
+    found: NDArray[np.complex128] = 2 * turned.reshape(n, periods, 32).mean(axis=2).T
+    return found
 
 
 profiles = st.lists(st.floats(0.1, 1.0), min_size=6, max_size=6).map(lambda p: 0.05 * np.array(p))
@@ -150,8 +151,10 @@ def test_the_way_up_without_softening_is_the_way_down_upside_down() -> None:
 def test_slopes_are_the_derivatives(way: str) -> None:
     chain = chain_of(4)
     before, after = 0.05 * np.array([[[1, 0.1, 1, 0.1]], [[0.1, 1, 1, 1]]])
-    ends = (after,) if way == "rise" else (before, after)
-    ramp = {"rise": rise, "change": change}[way](chain, *ends, OMEGA, DURATION, NODES)
+    if way == "rise":
+        ramp = rise(chain, after, OMEGA, DURATION, NODES)
+    else:
+        ramp = change(chain, before, after, OMEGA, DURATION, NODES)
     step = DURATION / (NODES - 1)
     for values, slopes in ((ramp.epsilon, ramp.epsilon_slope), (ramp.lam, ramp.lam_slope)):
         numeric = (8 * (values[:, 3:-1] - values[:, 1:-3]) - (values[:, 4:] - values[:, :-4])) / (12 * step)

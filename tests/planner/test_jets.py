@@ -26,7 +26,8 @@ def factorials(length: int) -> NDArray[np.float64]:
 
 
 def exponential(rate: complex) -> NDArray[np.complex128]:
-    return rate**K * np.exp(rate * X) / factorials(LENGTH)
+    jet: NDArray[np.complex128] = rate**K * np.exp(rate * X) / factorials(LENGTH)
+    return jet
 
 
 def complexed(real: NDArray[np.float64], imag: NDArray[np.float64]) -> NDArray[np.complex128]:

@@ -45,7 +45,7 @@ def free(amplitude: list[float]) -> WaveTarget:
 def test_the_nearest_is_the_best_there_is(device: Device, target: tuple[float, ...]) -> None:
     wanted = np.array(target)
     first, ratio = nearest_geometric(device, wanted, 1.0)
-    near = first * ratio ** np.arange(6)
+    near = first * ratio ** np.arange(6, dtype=np.float64)
     steepest = device.coupling.lam.max / (device.delta * device.omega.min)
     best = least_misfit(wanted, 1.0 if device is RING else steepest)
     assert best - 1e-2 <= misfit(near, wanted) <= best + 5e-3

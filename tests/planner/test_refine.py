@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from chainsim import Chain, Outcome, Setting, solve
+from chainsim import Chain, Outcome, Response, Setting, solve
 from planner.amplitudes import refine as refine_module
 from planner.amplitudes.refine import Refined, refine
 from planner.closed_forms.links import drive_for, links_for
@@ -71,7 +72,7 @@ def test_the_closed_form_alone_would_not_do() -> None:
 def test_few_steps_are_enough(full_scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
     solves = 0
 
-    def counted(*arguments: object, **named: object) -> object:
+    def counted(*arguments: Any, **named: Any) -> Response:
         nonlocal solves
         solves += 1
         return solve(*arguments, **named)

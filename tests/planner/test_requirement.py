@@ -18,6 +18,7 @@ from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
 from planner.surroundings import HigherMode, Surroundings, assumed
 from planner.transitions.check import Way
+from tests.support.known import known
 
 LINKED = load_device("linked-6x6")
 NOTHING = Surroundings()
@@ -291,9 +292,11 @@ def test_the_way_into_a_long_chain_lacks_no_more_than_is_said(row):
     frame = next(iter(plan_scene(scene, LINKED).frames))
     state, ramp = frame.states[0], frame.ramps[0]
     omega, rate = state.omega, LINKED.tau_per_s
-    way = Way(ramp.t_s * rate, ramp.epsilon, ramp.epsilon_slope / rate, ramp.lam_t_s * rate, ramp.lam)
+    assert ramp is not None
+    drive, slope = known(ramp.epsilon), known(ramp.epsilon_slope) / rate
+    way = Way(ramp.t_s * rate, drive, slope, known(ramp.lam_t_s) * rate, known(ramp.lam))
     dtau = 2 * math.pi / omega / 64
-    tau = dtau * np.arange(64 * math.ceil(frame.settled_s * rate / dtau / 64))
+    tau = dtau * np.arange(64 * math.ceil(frame.settled_s * rate / dtau / 64), dtype=np.float64)
     carrier = np.exp(1j * omega * tau)
     force, lam = np.zeros((len(tau), 1, 6)), np.zeros((len(tau), 1, 6))
     force[:, 0, 0], lam[:, 0, 1:] = (way.drive(tau)[0] * carrier).real, way.links(tau)
@@ -311,7 +314,7 @@ def test_the_way_in_counts_for_half_of_its_time():
     scene = encode_text(TextSource.of_text("a"), GridShape(6, 6), TextOptions(dwell_s=1.0))
     frame = next(iter(plan_scene(scene, device).frames))
     at, ramp = next((i, ramp) for i, ramp in enumerate(frame.ramps) if ramp is not None)
-    lacking = 1 - ramp.bias[:, :] @ frame.states[at].bias / (frame.states[at].bias @ frame.states[at].bias)
+    lacking = 1 - known(ramp.bias) @ frame.states[at].bias / (frame.states[at].bias @ frame.states[at].bias)
     mean = np.trapezoid(lacking, ramp.t_s) / (frame.end_s - frame.start_s)
     found = require([frame], device, NOTHING, tol=1e-3)
     assert found["transients"].effect / 2 == pytest.approx(mean, rel=0.02)

@@ -98,9 +98,9 @@ def test_one_oscillator_has_the_roots_of_its_cubic(
 def test_a_static_deflection_solves_its_cubic() -> None:
     parts = draw(4, count=5, seed=1).parts(Chain(4, 0.01, -1.0), RelativeSpread(f0=0.02, beta=0.3, lam=0.1))
     bias, lam = np.array([0.2, -0.1, 0.05, 0.3]), np.array([0.0, 0.02, 0.05, 0.01])
-    z = march(parts, (bias + 0j)[:, None, None], lam[:, None, None], 0.0).phasor
-    assert np.all(z.imag == 0)
-    z = z.real
+    phasor = march(parts, (bias + 0j)[:, None, None], lam[:, None, None], 0.0).phasor
+    assert np.all(phasor.imag == 0)
+    z = phasor.real
     coupled = lam[:, None, None] * parts.lam_gain
     before = np.concatenate([np.zeros_like(z[:1]), z[:-1]])
     force = bias[:, None, None] + coupled * (before - z)
@@ -266,7 +266,9 @@ def test_an_actuator_beyond_its_hilltop_is_not_made() -> None:
     parts = draw(1, count=1, seed=0).parts(chain, RelativeSpread())
     motion = march(parts, np.full((1, 1, 1), 2.0 + 0j), np.zeros((1, 1, 1)), 1.05)
     assert motion.escaped.all()
-    report = judge(FrameTarget(np.ones((1, 1)) + 0j, abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5)
+    report = judge(
+        FrameTarget(np.ones((1, 1), complex), abs(motion.phasor[0, 0, 0])), motion, tolerance=1.0, threshold=0.5
+    )
     assert report.error.max() < 1e-12
     assert report.yield_ == 0.0
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from chainsim import Outcome, load_device
 from drivers import Waveform, WaveformError, write_waveform
@@ -35,9 +36,14 @@ def tone(omega: float, epsilon: complex) -> PointTone:
     return PointTone(omega, epsilon, np.full(1, 0.02 + 0.01j))
 
 
+def complexed(values: NDArray[np.complexfloating]) -> NDArray[np.complex128]:
+    """The same numbers, for numpy's stubs know no width of a product with a complex number."""
+    return values.astype(np.complex128)
+
+
 def ramp(last: complex, *tones: ToneRamp) -> Ramp:
     x = np.linspace(0, 1, 5)
-    return Ramp(0.1 * x, epsilon=last * x**2, epsilon_slope=20 * last * x, tones=tones)
+    return Ramp(0.1 * x, complexed(last * x**2), complexed(20 * last * x), tones=tones)
 
 
 def sampled(shown: OperatingPoint, way: Ramp | None) -> np.ndarray:
@@ -51,7 +57,7 @@ def sampled(shown: OperatingPoint, way: Ramp | None) -> np.ndarray:
 def test_a_drive_is_the_sum_of_its_tones() -> None:
     side = tone(1.02, 0.004 - 0.002j)
     x = np.linspace(0, 1, 5)
-    way = ramp(0.01j, ToneRamp(1.02, side.epsilon * x**2, 20 * side.epsilon * x))
+    way = ramp(0.01j, ToneRamp(1.02, complexed(side.epsilon * x**2), complexed(20 * side.epsilon * x)))
     volts = sampled(state(tones=(side,)), way)
     tau = FINE.tau_per_s * np.arange(len(volts)) / FINE.amplifier.rate_hz
     size = np.minimum(tau / FINE.tau_per_s / 0.1, 1.0) ** 2
@@ -62,7 +68,7 @@ def test_a_drive_is_the_sum_of_its_tones() -> None:
 def test_a_tone_at_the_main_frequency_is_not_heard_twice() -> None:
     before, after = state(0.01j, 1.0), state(0.02 + 0j, 1.0)
     down = np.linspace(1, 0, 5)
-    fall = as_tone(Ramp(np.linspace(0, 0.1, 5), 0.01j * down, np.full(5, -0.1j)), 1.0)
+    fall = as_tone(Ramp(np.linspace(0, 0.1, 5), complexed(0.01j * down), np.full(5, -0.1j)), 1.0)
     whole = joined(fall, ramp(0.02 + 0j), before, after)
     assert whole.tones == ()
     assert whole.epsilon is not None
@@ -108,7 +114,8 @@ def test_turning_turns_every_tone() -> None:
 
 def test_tones_are_kept() -> None:
     kept = PlanCache(SINGLE, 20.0)
-    shown, way = state(tones=(tone(1.1, 0.002 + 0.001j),)), ramp(0.01j, ToneRamp(1.1, np.full(5, 1j), np.zeros(5) + 0j))
+    shown = state(tones=(tone(1.1, 0.002 + 0.001j),))
+    way = ramp(0.01j, ToneRamp(1.1, np.full(5, 1j), np.zeros(5, np.complex128)))
     kept.keep([(b"tone state", shown), (b"tone ramp", way)])
     back, way_back = PlanCache(SINGLE, 20.0).find([b"tone state", b"tone ramp"])
     assert back.tones[0].epsilon == shown.tones[0].epsilon

@@ -4,6 +4,7 @@ import itertools
 import json
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -78,7 +79,8 @@ def test_work_grows_along_the_ladder(single):
 def test_rows_carry_their_price_and_long_ones_are_not_watched(single):
     assert [row.seconds for row in single.rows] == pytest.approx([1e-3 * (at + 1) for at in range(len(single.rows))])
     assert all(row.memory > 0 for row in single.rows)
-    dear = priced(*frames_of("a", "independent-6x6"), prices=itertools.repeat(1.01 * LONG_S))
+    frames, device = frames_of("a", "independent-6x6")
+    dear = priced(frames, device, itertools.repeat(1.01 * LONG_S))
     assert all(row.memory is None for row in dear.rows)
 
 
@@ -99,10 +101,14 @@ def test_choices_on_a_scene_follow_the_prices(single):
 
 def test_the_price_by_the_clock_is_the_best_of_a_few_runs():
     runs = itertools.count()
+
+    def run() -> list[int]:
+        return [next(runs)]
+
     for spent, price, made in (((0.2, 0.1, 0.3), 0.1, 3), ((0.1, 5.0, 0.05), 0.05, 3), ((9.0,), 9.0, 1)):
         readings = iter([each for long in spent for each in (100.0, 100.0 + long)])
         before = next(runs)
-        answers, seconds = by_clock(lambda: [next(runs)], lambda readings=readings: next(readings))
+        answers, seconds = by_clock(run, partial(next, readings))
         assert seconds == pytest.approx(price)
         assert answers == [before + made]
         assert next(readings, None) is None

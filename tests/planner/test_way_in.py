@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from planner.transitions.limits import WayError, WayLimits
 from planner.transitions.rise import find_way
 from planner.transitions.search import RampSearch
 from planner.transitions.steering import LinkCourse, Steering, rest
+from tests.support.known import known
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -94,7 +96,7 @@ def integrated(
     """Middle of each period in seconds, first harmonics in it, shape (periods, n), and the largest |z| in it."""
     dtau = 2 * np.pi / omega / FINE
     periods = math.ceil(until_s * TAU_PER_S * omega / (2 * np.pi))
-    tau = dtau * np.arange(periods * FINE)
+    tau = dtau * np.arange(periods * FINE, dtype=np.float64)
     epsilon, links = controls(ramps, held, tau)
     carrier = np.exp(1j * (omega * tau + phase))
     force, lam = np.zeros((2, len(tau), 1, chain.n))
@@ -137,16 +139,15 @@ def test_dop853_agrees() -> None:
     assert ramp.epsilon is not None
     assert ramp.epsilon_slope is not None
     assert ramp.lam is not None
-    assert ramp.lam_t_s is not None
     drive = CubicHermiteSpline(ramp.t_s, ramp.epsilon, ramp.epsilon_slope)
-    one = ramp.lam[:, 0]
+    one, lam_t_s = ramp.lam[:, 0], known(ramp.lam_t_s)
 
     def slope(tau: float, state: Floats) -> Floats:
         t = min(tau / TAU_PER_S, ramp.duration_s)
         z, v = state[:n], state[n:]
         out = np.concatenate([v, -PAPER.delta * v - z - PAPER.beta * z**3])
         out[n] += (complex(drive(t)) * np.exp(1j * omega * tau)).real
-        out[n + 1 :] += np.interp(t, ramp.lam_t_s, one) * (z[:-1] - z[1:])
+        out[n + 1 :] += float(np.interp(t, lam_t_s, one)) * (z[:-1] - z[1:])
         return out
 
     period = 2 * np.pi / omega
@@ -263,7 +264,7 @@ def test_the_scale_of_z_does_not_matter() -> None:
 
 
 @pytest.mark.parametrize(("lag", "scope"), [(120, "chain"), (90, "fixed")])
-def test_a_fall_leaves_a_thousandth(lag: float, scope: str) -> None:
+def test_a_fall_leaves_a_thousandth(lag: float, scope: Literal["chain", "fixed"]) -> None:
     omega, held = wave(lag, 0.07)
     limits = replace(LIMITS, lam_scope=scope)
     ramp = paper_way(lag, 0.07)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from chainsim import Chain, load_device
+from chainsim import Chain, load_device, solve
 from planner.amplitudes import refine
 from planner.amplitudes.vibration import Vibration
 from planner.cache import PlanCache
@@ -20,6 +20,7 @@ from planner.transitions import jets
 from planner.transitions.blending import _kinds, blended
 from planner.transitions.envelopes import POINTS, change
 from planner.transitions.resample import chebyshev_points, converged, resampled
+from tests.support.known import known
 
 LINKED = load_device("linked-6x6")
 CHAIN, OMEGA = LINKED.chain, 1.35
@@ -81,9 +82,9 @@ def test_a_way_does_not_depend_on_those_beside_it():
     family = Vibration(LINKED, 20.0)
     states = family.states(np.concatenate([ROWS[1:20], rows[:5]]) / LINKED.full_scale)
     ways = family.ramps(states[:-1], states[1:])
-    (alone,) = family.ramps(states[3:4], states[4:5])
-    assert np.array_equal(alone.epsilon, ways[3].epsilon)
-    assert np.array_equal(alone.lam, ways[3].lam)
+    beside, own = known(ways[3]), known(family.ramps(states[3:4], states[4:5])[0])
+    assert np.array_equal(known(own.epsilon), known(beside.epsilon))
+    assert np.array_equal(known(own.lam), known(beside.lam))
 
 
 def test_what_cannot_be_changed_to_is_told_at_every_node():
@@ -108,10 +109,9 @@ def test_ways_with_the_same_end_share_its_work():
 def test_the_closed_form_with_its_third_harmonic_needs_no_step(beta, monkeypatch):
     chain = Chain(6, LINKED.delta, beta)
     solved = []
-    plain = refine.solve
 
     def counting(*arguments, **options):
-        solved.append(plain(*arguments, **options))
+        solved.append(solve(*arguments, **options))
         return solved[-1]
 
     monkeypatch.setattr(refine, "solve", counting)
@@ -129,8 +129,8 @@ def test_many_plans_are_asked_for_at_once(tmp_path, monkeypatch):
     cache = PlanCache(LINKED, 20.0)
     items = [b"%d" % k for k in range(ASKED_AT_ONCE + 10)]
     cache.keep((item, Ramp(t_s=np.arange(float(k)))) for k, item in enumerate(items))
-    asked = []
-    cache._file._connection.set_trace_callback(asked.append)
+    asked: list[str] = []
+    known(cache._file._connection).set_trace_callback(asked.append)
     found = cache.find([*items, b"none"])
     assert len(asked) == 2
     assert found.pop() is None

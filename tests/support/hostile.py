@@ -1,21 +1,24 @@
 """Extreme settings, and the systems they are tried on."""
 
+from typing import Any
+
 import numpy as np
 
 from chainsim import Chain, Setting
 
 ESCAPE = 2 / (3 * np.sqrt(3))
-BASE = {"n": 6, "delta": 0.02, "beta": -1.0, "epsilon": 1e-3, "lam": 0.01, "omega": 1.05, "preload": 0.0}
+Given = dict[str, Any]
+BASE: Given = {"n": 6, "delta": 0.02, "beta": -1.0, "epsilon": 1e-3, "lam": 0.01, "omega": 1.05, "preload": 0.0}
 
 
-def fold(delta, omega):
+def fold(delta: float, omega: float) -> float:
     """The drive at which the lower branch of the first oscillator ends, by the cubic of one harmonic."""
     kappa, g = 1 - omega**2, delta * omega
     v = kappa / 3 * (2 - np.sqrt(1 - 3 * (g / kappa) ** 2))
-    return np.sqrt(v * ((kappa - v) ** 2 + g * g) / 0.75)
+    return float(np.sqrt(v * ((kappa - v) ** 2 + g * g) / 0.75))
 
 
-HOSTILE = [
+HOSTILE: list[Given] = [
     *({"lam": value} for value in (0.0, 1e-12, 1.0, 1e6, -2.0)),
     *({"omega": value} for value in (1e-6, 1e-3, 1.0, np.nextafter(1.0, 0), np.nextafter(1.0, 2), 1e3, 1e6)),
     *({"delta": value} for value in (0.0, 1e-12, 1.0, 1e6)),
@@ -33,12 +36,14 @@ HOSTILE = [
     {"delta": 1e6, "omega": 1e-6},
     {"lam": 1e6, "omega": 1e3},
 ]
-CLOSURES = {"open": {}, "ring": {"closure": "ring"}, "bidirectional": {"closure": "bidirectional"}, "grid": {}}
+CLOSURES: dict[str, Given] = {
+    "open": {}, "ring": {"closure": "ring"}, "bidirectional": {"closure": "bidirectional"}, "grid": {}
+}  # fmt: skip
 SYSTEMS = CLOSURES | {"amplifier": {"kind": "amplifier"}, "unequal": {}}
 ROWS = {1: 1, 2: 2, 6: 2, 1000: 20, 1_000_000: 1000}
 
 
-def built(system, extreme):
+def built(system: str, extreme: Given) -> tuple[Chain, Setting]:
     values = BASE | extreme
     n, given = values["n"], {"delta": values["delta"], "beta": values["beta"]} | SYSTEMS[system]
     if system == "grid":

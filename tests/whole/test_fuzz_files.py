@@ -313,7 +313,7 @@ def _kinds_of_tables(folder: Path) -> dict[str, Kind]:
         source.write_bytes(_yaml_bytes(plain))
         return lambda path: read_sweep(source).settings(0, 3)
 
-    arrays = {"epsilon": np.linspace(1, 2, 40), "lam": np.linspace(1, 2, 80).reshape(40, 2)}
+    arrays: dict[str, Any] = {"epsilon": np.linspace(1, 2, 40), "lam": np.linspace(1, 2, 80).reshape(40, 2)}
     archives = []
     for save in (np.savez, np.savez_compressed):
         buffer = io.BytesIO()

@@ -172,7 +172,7 @@ class Harness:
             if (folder / path).with_suffix(".json").exists():
                 manifest, reader = read_waveform(path)
                 manifest.check_digest(reader.path)
-        for name in sorted(self.new | before):
+        for name in sorted({**self.new, **before}):
             data = (folder / name).read_bytes() if (folder / name).exists() else None
             state = "new" if data == self.expected(before).get(name) else "old" if data == before.get(name) else "torn"
             assert state != "torn", name

@@ -63,7 +63,9 @@ def late_writer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Cal
 
     class Writer(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
+            assert isinstance(record.args, tuple)
             (path,) = record.args
+            assert isinstance(path, Path)
             started.append(threading.Thread(target=path.write_bytes, args=(waiting.pop(path),)))
             started[-1].start()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainsim import Chain, Setting, solve
+from chainsim import Chain, Closure, Setting, solve
 from chainsim.continuation.locking import locking
 from chainsim.continuation.spectrum import delta_from_critical_lam
 
@@ -41,7 +41,7 @@ def test_states_a_and_b_of_the_open_chain(delta, epsilon, lag, tolerance):
 def test_state_c_belongs_to_the_ring(delta, paper):
     orbit = paper("states").ring_orbit(6e-4, delta)
     assert int((np.abs(orbit.multipliers) > 1).sum()) >= 2
-    ring = Chain(6, delta, -1.0, "ring")
+    ring = Chain(6, delta, -1.0, Closure.RING)
     assert not locking(ring, Setting.of(ring, epsilon=6e-4, lam=LAM, omega=1.0), start="rest").locked[0]
 
 

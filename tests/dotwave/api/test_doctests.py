@@ -5,7 +5,7 @@ from __future__ import annotations
 import doctest
 import inspect
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SAID = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
-def own(name: str) -> Iterator[tuple[str, object]]:
+def own(name: str) -> Iterator[tuple[str, Callable[..., object]]]:
     """A public object, and where it is a class of `dotwave` its public methods."""
     found = getattr(dotwave, name)
     yield name, found
@@ -26,7 +26,7 @@ def own(name: str) -> Iterator[tuple[str, object]]:
                 yield f"{name}.{method}", value
 
 
-EXAMPLES = dict(one for name in dotwave.__all__ for one in own(name))
+EXAMPLES = dict(one for name in dir(dotwave) for one in own(name))
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_parameters_stand_one_a_line_with_results_and_errors(name: str) -> None:
     lines = words.splitlines()
     for parameter in inspect.signature(found).parameters.values():
         if parameter.name != "self":
-            stars = {parameter.VAR_KEYWORD: "**", parameter.VAR_POSITIONAL: "*"}.get(parameter.kind, "")
+            stars = {"VAR_KEYWORD": "**", "VAR_POSITIONAL": "*"}.get(parameter.kind.name, "")
             assert any(line.split(" : ")[0] == stars + parameter.name for line in lines), parameter.name
     if "." not in name:
         assert {"Parameters", "Returns", "Raises", "Examples"} <= set(lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html.parser
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from chainsim import Outcome
 from dotwave.api import plans
 from drivers import read_waveform
 from encoders.braille import text as encoder
+from encoders.braille.layout import paginate
 from planner import Plan, plan_scene
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -50,7 +52,8 @@ def test_the_ten_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert plan.report().ok
     wave = plan.waveform()
     volts = wave.samples(0.0, 0.5)
-    assert (volts.dtype, volts.shape) == (np.float64, (wave.rate_hz // 2, len(wave.channels)))
+    assert volts.dtype == np.float64
+    assert volts.shape == (wave.rate_hz // 2, len(wave.channels))
     wave.write("hello.wav")
     felt = dw.verify("hello.wav")
     assert felt.ok
@@ -87,9 +90,14 @@ def test_the_file_is_that_of_the_command_line(tmp_path: Path, dotwave) -> None:
 
 
 def test_a_long_text_is_not_encoded_before_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = []
-    plain = encoder.paginate
-    monkeypatch.setattr(encoder, "paginate", lambda *given: (made.append(page) or page for page in plain(*given)))
+    made: list[object] = []
+
+    def counted(*given: Any) -> Iterator[Any]:
+        for page in paginate(*given):
+            made.append(page)
+            yield page
+
+    monkeypatch.setattr(encoder, "paginate", counted)
     plan = dw.plan(dw.text("It rains and it pours. " * 2000, "paper-6x6"), "paper-6x6")
     assert repr(plan) == "<ScenePlan of text: It rains and it pours. It rains and i... on paper-6x6>"
     assert made == []
@@ -111,10 +119,8 @@ def test_a_plan_is_a_sequence() -> None:
 
 
 def test_a_tolerance_judges_every_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = plans.plan_scene
-
     def off(*given: Any, **named: Any) -> Any:
-        plan = plain(*given, **named)
+        plan = plan_scene(*given, **named)
         frames = [replace(one, states=tuple(replace(state, error=0.05) for state in one.states)) for one in plan.frames]
         return replace(plan, frames=frames)
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -18,6 +19,9 @@ from chainsim import Device, ProfileError, load_device
 from dotwave.errors import AppError
 from dotwave.studies.calibrate import CalibrateReport, calibrate
 from dotwave.studies.measured_sweeps import COLUMNS, read_sweeps
+
+if TYPE_CHECKING:
+    from tests.conftest import Ended
 
 ROOT = Path(__file__).resolve().parents[3]
 SAMPLE = ROOT / "samples" / "calibration" / "sweep.csv"
@@ -97,7 +101,7 @@ def test_the_sample_is_what_its_script_makes(tmp_path: Path) -> None:
     np.testing.assert_allclose(made, kept, atol=2e-4)
 
 
-def some(change: Callable[[list[list[str]]], None] = lambda rows: None) -> str:
+def some(change: Callable[[list[list[str]]], object] = lambda rows: None) -> str:
     """A small table of two actuators, changed."""
     rows = [
         [str(part) for part in (0, col, f, 0.2, 0.01 * (1 + col), -0.5)]
@@ -158,7 +162,7 @@ def test_columns_may_come_in_any_order_and_with_others(tmp_path: Path) -> None:
         (some(put(1, "col", "1.5")), r"sweep\.csv:3: column col: expected a whole number 0\.\.5, got '1\.5'"),
         (some(put(14, "drive_v", "0.3")), r"sweep\.csv:16: column drive_v: 0\.3 where line 4 of the chain's first"),
         (some(lambda rows: rows.pop()), r"column col: actuator 1 of row 0 has 11 lines, the first of its chain 12"),
-        (some(lambda rows: [row.__setitem__(1, "2") for row in rows[12:]] and None), "column 2 but not column 1"),
+        (some(lambda rows: [row.__setitem__(1, "2") for row in rows[12:]]), "column 2 but not column 1"),
         (some(lambda rows: rows.__delitem__(slice(0, 12))), "column 1 but not column 0"),
         ("row\x00" + some(), r"sweep\.csv:1: "),
     ],
@@ -290,7 +294,7 @@ def test_a_profile_without_actuators_is_a_device_too(tmp_path: Path) -> None:
 
 def test_another_row_is_added_to_what_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows can be measured one at a time: entries of other actuators stay, those measured again are replaced."""
-    before = [
+    before: list[dict[str, object]] = [
         {"row": 0, "col": 1, "f0_hz": 99.0},
         {"row": 3, "col": 2, "f0_hz": 140.0, "delta": 0.004, "plus_minus": {"f0_hz": 0.1}},
     ]
@@ -304,7 +308,7 @@ def test_another_row_is_added_to_what_is_known(tmp_path: Path, monkeypatch: pyte
     assert device.actuators[6] == known.actuators[1]
 
 
-def test_the_command_writes_and_prints(dotwave: Callable[..., object], tmp_path: Path) -> None:
+def test_the_command_writes_and_prints(dotwave: Callable[..., Ended], tmp_path: Path) -> None:
     out = tmp_path / "my-device.yaml"
     ended = dotwave("calibrate", SAMPLE, "--device", "linked-6x6", "--lam", "0.006", "-o", out)
     assert ended.code == 0
@@ -320,7 +324,7 @@ def test_the_command_writes_and_prints(dotwave: Callable[..., object], tmp_path:
     assert "bad.csv:2: column col" in ended.err
 
 
-def test_the_command_reads_standard_input(dotwave: Callable[..., object], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_reads_standard_input(dotwave: Callable[..., Ended], monkeypatch: pytest.MonkeyPatch) -> None:
     class Stream:
         buffer = io.BytesIO(SAMPLE.read_bytes())
 

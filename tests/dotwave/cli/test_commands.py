@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
 
 def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
-    given = {}
+    given: dict[str, Any] = {}
 
     def scene(source, device, options):
         given.update(source=source.text, options=options)
@@ -85,7 +86,7 @@ def test_text_gives_everything_to_the_pipeline(dotwave, stand_in) -> None:
 
 
 def test_text_leaves_unsaid_options_to_the_encoder(dotwave, stand_in) -> None:
-    given = {}
+    given: dict[str, Any] = {}
     stand_in("api.scenes", text=lambda _, device, options: given.update(options=options), device=lambda name: name)
     stand_in("rendering.render", render=lambda *_: BRIEF)
     dotwave("text", "Hello")

@@ -24,7 +24,7 @@ def failing(dotwave, monkeypatch: pytest.MonkeyPatch):
             raise error
 
         fake = ModuleType("dotwave.api.felt")
-        fake.verify = fail
+        vars(fake).update(verify=fail)
         monkeypatch.setitem(sys.modules, "dotwave.api.felt", fake)
         return dotwave("verify", "x.wav")
 

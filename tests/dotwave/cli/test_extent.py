@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from chainsim import load_device
@@ -16,7 +18,8 @@ from dotwave.rendering import extent
 from dotwave.rendering.extent import extent_of
 from dotwave.rendering.render import render
 from dotwave.request import Request
-from encoders import GridShape, Presentation, TextOptions, encode_text
+from drivers import Encoding
+from encoders import Frame, GridShape, Presentation, TargetPattern, TextOptions, encode_text
 
 ROOT = Path(__file__).resolve().parents[3]
 TEXT = "Hello world, it rains and it pours"
@@ -25,7 +28,8 @@ TEXT = "Hello world, it rains and it pours"
 @pytest.mark.parametrize("device", ["paper-6x6", "linked-6x6"])
 @pytest.mark.parametrize("name", ["x.wav", "x.npz", "x.raw", "x.csv", "pcm24.wav", "rows.wav"])
 def test_the_size_that_is_said_is_that_of_the_file(tmp_path: Path, device: str, name: str) -> None:
-    out, encoding = tmp_path / name, "pcm24" if name.startswith("pcm24") else "float32"
+    out = tmp_path / name
+    encoding: Encoding = "pcm24" if name.startswith("pcm24") else "float32"
     options = TextOptions(presentation=Presentation.BY_ROW if name.startswith("rows") else Presentation.TOGETHER)
     profile = load_device(device)
     scene = encode_text(TEXT, GridShape(profile.rows, profile.cols), options)
@@ -42,10 +46,9 @@ def test_the_size_that_is_said_is_that_of_the_file(tmp_path: Path, device: str, 
 def test_frames_are_drawn_once_and_none_is_kept() -> None:
     alive: list[int] = [0, 0]
 
-    class One:
-        dwell_s = 1.0
-
+    class One(Frame):
         def __init__(self) -> None:
+            super().__init__(TargetPattern(np.zeros((6, 6), dtype=np.complex128)), dwell_s=1.0)
             alive[0] += 1
             alive[1] = max(alive)
 
@@ -135,7 +138,7 @@ def test_what_does_not_fit_on_the_disk_is_not_begun(
     small: Path, dotwave, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     usage = type("Usage", (), {"free": 12_000})
-    monkeypatch.setattr(extent.shutil, "disk_usage", lambda _: usage)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
     ended = dotwave(*calls(small)[name])
     assert (ended.code, ended.out, ended.err.count("\n")) == (2, "", 1)
     assert f"in {small}, where 12 kB are free; free some space" in ended.err
@@ -150,5 +153,5 @@ def test_what_waits_in_the_temporary_folder_counts(tmp_path: Path, dotwave, monk
     monkeypatch.setattr(tempfile, "tempdir", None)
     for free, code in ((1.5 * said.most, 2), (2.5 * said.most, 0)):
         usage = type("Usage", (), {"free": free})
-        monkeypatch.setattr(extent.shutil, "disk_usage", lambda _, usage=usage: usage)
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, usage=usage: usage)
         assert dotwave("text", "Hello", "-o", tmp_path / "x.npz").code == code

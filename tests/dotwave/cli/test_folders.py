@@ -27,7 +27,7 @@ def given(dotwave, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-WRITERS = {
+WRITERS: dict[str, list[object]] = {
     "text": ["text", "a", "-o", "new/deep/x.wav"],
     "haptic": ["text", "a", "-d", "linked-6x6", "-o", "new/deep/x.ahap"],
     "image": ["image", HEART, "-o", "new/deep/x.wav"],

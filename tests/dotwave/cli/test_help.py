@@ -19,7 +19,7 @@ from dotwave.cli.completion import completed_devices, completed_files
 from dotwave.cli.help import GROUPS
 
 ROOT = Path(__file__).resolve().parents[3]
-COMMANDS = typer.main.get_command(application()).commands
+COMMANDS = typer.main.get_group(application()).commands
 
 
 def test_every_command_stands_in_one_group_of_the_help(dotwave) -> None:

@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 
-def run(folder: Path, *arguments: str, stdin: bytes = b"", limit: int | None = None) -> subprocess.CompletedProcess:
+def run(
+    folder: Path, *arguments: str, stdin: bytes = b"", limit: int | None = None
+) -> subprocess.CompletedProcess[bytes]:
     def small_files() -> None:
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
+from PIL.GifImagePlugin import GifImageFile
 
 from dotwave.errors import AppError
 from dotwave.figures.card import CardShape, draw_card, draw_disc
@@ -118,6 +119,7 @@ def test_the_animation_lasts_as_long_as_the_frames(tmp_path: Path) -> None:
     start = tmp_path / "x"
     write_preview(report(*(frame(n, text=f"part {n}", dwell_s=0.605) for n in range(5))), start)
     with Image.open(f"{start}.gif") as animation:
+        assert isinstance(animation, GifImageFile)
         lengths = []
         for number in range(animation.n_frames):
             animation.seek(number)

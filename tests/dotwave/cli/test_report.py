@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dotwave.reports.text import FrameCheck, TextReport, VerifyReport, decibels, plain
+from dotwave.reports.report import plain
+from dotwave.reports.text import FrameCheck, TextReport, VerifyReport, decibels
 
 GOOD = FrameCheck(
     page=0, start_s=0.0, settled_s=0.3, end_s=1.0, outcome="ok", target=np.array([[1.0, 0.1]]),

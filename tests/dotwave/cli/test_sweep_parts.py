@@ -267,7 +267,8 @@ def test_a_second_run_at_the_same_time_is_refused_and_spoils_nothing(
 ) -> None:
     import dotwave.studies.sweep as module
 
-    out, solve, refused = tmp_path / "out.npz", module.answers, []
+    out, solve = tmp_path / "out.npz", module.answers
+    refused: list[None] = []
 
     def meanwhile(*given: object) -> object:
         if not refused:

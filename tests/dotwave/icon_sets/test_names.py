@@ -252,9 +252,9 @@ def test_a_member_that_unpacks_to_much_is_read_in_part(tmp_path: Path, suffix: s
         with tarfile.open(archive, "w:gz") as tar, (tmp_path / "zeros").open("wb+") as zeros:
             zeros.truncate(size)
             tar.addfile(tar.gettarinfo(arcname="a.svg", fileobj=zeros), zeros)
-    (file,) = read_icons(find_icons([str(archive)]))
-    assert not file.error
-    assert len(file.data) == 64_000_001
+    (icon,) = read_icons(find_icons([str(archive)]))
+    assert not icon.error
+    assert len(icon.data) == 64_000_001
 
 
 @pytest.mark.parametrize("suffix", [".zip", ".tar", ".tgz", ".tar.xz"])

@@ -11,9 +11,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +26,7 @@ from dotwave.icon_sets import work
 from dotwave.icon_sets.build import IconOptions, render_icons
 from dotwave.icon_sets.journal import Journal
 from dotwave.icon_sets.pool import LocalPool
-from dotwave.icon_sets.work import Recipe, Record, Task
+from dotwave.icon_sets.work import Record, Task
 from drivers import FileError
 from encoders import GridShape, encode_picture
 
@@ -41,8 +43,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def manifest(out: Path) -> dict:
-    return json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+def manifest(out: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((out / "manifest.json").read_text(encoding="utf-8"))
+    return found
 
 
 def journalled(out: Path) -> list[str]:
@@ -201,7 +204,7 @@ def icons_command(folder: Path, out: Path) -> list[str]:
     return [sys.executable, "-m", "dotwave", "icons", str(folder), "-o", str(out), "--workers", "2"]
 
 
-def started(folder: Path, out: Path) -> subprocess.Popen:
+def started(folder: Path, out: Path) -> subprocess.Popen[bytes]:
     running = subprocess.Popen(
         icons_command(folder, out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
     )
@@ -245,7 +248,7 @@ def test_ctrl_c_leaves_a_manifest_of_what_is_finished(tmp_path: Path) -> None:
     assert all(row["outcome"] == "ok" for row in found["icons"])
 
 
-def deadly(recipe: Recipe, tasks: list[Task]) -> list[Record]:
+def deadly(recipe: None, tasks: Sequence[Task]) -> list[Record]:
     """Work that ends its process for one task, as running out of memory does."""
     if any(task.key == "deadly" for task in tasks):
         os.kill(os.getpid(), signal.SIGKILL)
@@ -262,7 +265,7 @@ def test_a_picture_that_ends_its_process_takes_no_other_with_it() -> None:
     assert "ended" in lost[0]["bad"]
 
 
-def count(recipe: Recipe, tasks: list[Task]) -> list[Record]:
+def count(recipe: None, tasks: Sequence[Task]) -> list[Record]:
     return [{"key": task.key, "batch": len(tasks)} for task in tasks]
 
 
@@ -294,22 +297,26 @@ class Page(HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.headings, self.labels, self.links, self.ids = [], [], [], []
-        self.text, self.inside = [], []
+        self.headings: list[str] = []
+        self.labels: list[str] = []
+        self.links: list[str] = []
+        self.ids: list[str] = []
+        self.text: list[str] = []
+        self.inside: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
         if tag == "svg":
             assert given["role"] == "img"
-            self.labels.append(given["aria-label"])
+            self.labels.append(given["aria-label"] or "")
         if tag == "img":
             assert "alt" in given
         if tag == "a":
-            self.links.append(given["href"])
+            self.links.append(given["href"] or "")
         if tag == "html":
             assert given["lang"] == "en"
         if "id" in given:
-            self.ids.append(given["id"])
+            self.ids.append(given["id"] or "")
         self.inside.append(tag)
 
     def handle_endtag(self, tag: str) -> None:

@@ -6,6 +6,7 @@ import os
 import tarfile
 import zipfile
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -32,8 +33,9 @@ def packed(tree: Path, suffix: str) -> Path:
             for path in tree.rglob("*"):
                 out.write(path, path.relative_to(tree))
     else:
-        with tarfile.open(archive, "w:" + {".tgz": "gz", ".tar": "", ".tar.xz": "xz"}[suffix]) as out:
-            out.add(tree, ".")
+        modes: dict[str, Literal["w:gz", "w:", "w:xz"]] = {".tgz": "w:gz", ".tar": "w:", ".tar.xz": "w:xz"}
+        with tarfile.open(archive, modes[suffix]) as tar:
+            tar.add(tree, ".")
     return archive
 
 

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import psutil
@@ -19,7 +19,7 @@ import pytest
 from dotwave.errors import AppError
 from dotwave.icon_sets.build import IconOptions, render_icons
 from dotwave.icon_sets.pool import LocalPool
-from dotwave.icon_sets.work import Recipe, Record, Task
+from dotwave.icon_sets.work import Record, Task
 from dotwave.workers import end_with_parent
 
 SAMPLES = Path(__file__).resolve().parents[3] / "samples" / "icons"
@@ -31,7 +31,7 @@ def spin_in_c() -> None:
     sum(iter(int, 1))
 
 
-def hard(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
+def hard(recipe: object, tasks: Sequence[Task]) -> Iterator[Record]:
     """Does what the key of a task says."""
     for task in tasks:
         if task.key.startswith("spin"):
@@ -55,9 +55,9 @@ def hard(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
         yield {"key": task.key, "pid": os.getpid()}
 
 
-def noted(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
+def noted(recipe: Path, tasks: Sequence[Task]) -> Iterator[Record]:
     """Write down what was given together, in order, then do what `hard` does."""
-    folder = Path(recipe)  # type: ignore[arg-type]
+    folder = recipe
     Path(folder, f"{len(list(folder.iterdir()))}-{'+'.join(task.key for task in tasks)}").touch()
     return hard(recipe, tasks)
 
@@ -65,7 +65,7 @@ def noted(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
 def done(keys: list[str], batch: int, workers: int = 2, seconds: float = 0.5) -> tuple[dict[str, Record], int]:
     """Records by key, and how often each came."""
     with LocalPool(workers, seconds) as pool:
-        records = [one for part in pool.run(hard, None, map(Task, keys), batch) for one in part]  # type: ignore[arg-type]
+        records = [one for part in pool.run(hard, None, map(Task, keys), batch) for one in part]
     return {record["key"]: record for record in records}, len(records)
 
 
@@ -101,7 +101,7 @@ def test_the_task_that_ends_its_process_is_known(tmp_path: Path) -> None:
     """Of a batch only the one that ended the process is tried alone; those before it are done once more."""
     keys = ["0", "1", "kill", "2", "3"]
     with LocalPool(1) as pool:
-        assert len([one for part in pool.run(noted, tmp_path, map(Task, keys), 5) for one in part]) == 5  # type: ignore[arg-type]
+        assert len([one for part in pool.run(noted, tmp_path, map(Task, keys), 5) for one in part]) == 5
     tries = [path.name.split("-")[1].split("+") for path in sorted(tmp_path.iterdir())]
     assert tries == [keys, ["0", "1", "2", "3"], ["kill"]]
 
@@ -116,32 +116,32 @@ def test_many_that_end_their_process_end_no_set() -> None:
 def test_no_process_is_left_when_the_work_is_stopped_halfway() -> None:
     before = set(psutil.Process().children(recursive=True))
     with LocalPool(2) as pool:
-        next(pool.run(hard, None, map(Task, ["0", "sleep", "1", "2"]), 1))  # type: ignore[arg-type]
+        next(pool.run(hard, None, map(Task, ["0", "sleep", "1", "2"]), 1))
     left = {one for one in psutil.Process().children(recursive=True) if "resource_tracker" not in str(one.cmdline())}
     assert left <= before
 
 
 def test_a_pool_goes_on_after_work_that_was_given_up() -> None:
     with LocalPool(1) as pool:
-        given_up = pool.run(hard, None, map(Task, "abcdefgh"), 2)  # type: ignore[arg-type]
+        given_up = pool.run(hard, None, map(Task, "abcdefgh"), 2)
         next(given_up)
         given_up.close()  # type: ignore[attr-defined]
-        records = [one for part in pool.run(hard, None, map(Task, "xyz"), 2) for one in part]  # type: ignore[arg-type]
+        records = [one for part in pool.run(hard, None, map(Task, "xyz"), 2) for one in part]
     assert [record["key"] for record in records] == ["x", "y", "z"]
 
 
 def test_processes_that_cannot_begin_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("multiprocessing.spawn.get_executable", lambda: b"/bin/false")
     with pytest.raises(AppError, match="ended before it could begin"), LocalPool(2) as pool:
-        list(pool.run(hard, None, map(Task, "abc"), 1))  # type: ignore[arg-type]
+        list(pool.run(hard, None, map(Task, "abc"), 1))
     monkeypatch.setattr("multiprocessing.spawn.get_executable", lambda: b"/nowhere/at/all")
     with pytest.raises(AppError, match="process"), LocalPool(2) as pool:
-        list(pool.run(hard, None, map(Task, "abc"), 1))  # type: ignore[arg-type]
+        list(pool.run(hard, None, map(Task, "abc"), 1))
 
 
-def announce(recipe: Recipe, tasks: list[Task]) -> Iterator[Record]:
+def announce(recipe: str, tasks: Sequence[Task]) -> Iterator[Record]:
     """Write the number of the process down, then do what `hard` does."""
-    Path(recipe, f"{os.getpid()}").touch()  # type: ignore[arg-type]
+    Path(recipe, f"{os.getpid()}").touch()
     return hard(recipe, tasks)
 
 
@@ -156,7 +156,7 @@ if __name__ == "__main__":
 """
 
 
-def numbers(folder: Path, count: int, parent: subprocess.Popen) -> list[psutil.Process]:
+def numbers(folder: Path, count: int, parent: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """The processes that wrote their numbers down."""
     until = time.monotonic() + PATIENT_S
     while len(found := list(folder.iterdir())) < count:

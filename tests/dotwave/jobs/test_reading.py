@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, get_args
 
 import jsonschema
 import pytest
@@ -150,7 +151,7 @@ def test_textures_are_those_of_the_encoder(tmp_path: Path) -> None:
     assert (texture.target(shape).amplitude == wanted.amplitude).all()
 
 
-def names_in(schema: dict, names: set[str]) -> set[str]:
+def names_in(schema: dict[str, Any], names: set[str]) -> set[str]:
     for key, value in schema.items():
         if key == "properties":
             names |= set(value)
@@ -164,7 +165,7 @@ def test_the_schema_knows_every_key_and_the_short_forms() -> None:
     schema = job_schema()
     assert schema["$schema"].startswith("https://json-schema.org/")
     names = names_in(schema, set())
-    for model in [Job, *Job.model_fields["sequence"].annotation.__args__[:1]]:
+    for model in [Job, *get_args(Job.model_fields["sequence"].annotation)[:1]]:
         assert {field.alias or name for name, field in model.model_fields.items()} <= names
     assert {"say", "planning_s", "lag_deg", "walking_bars", "pitch_m", "chain_length"} <= names
     assert "short" not in names
@@ -192,6 +193,10 @@ def test_tolerances_by_name_and_number(tmp_path: Path, words: str, tol: float) -
     assert read_job(written(tmp_path, f"tolerance: {words}\nsequence: [{{pause_s: 1}}]")).tol == tol
 
 
+def picture_part(name: str, value: Any) -> PicturePart:
+    return PicturePart(**{"file": "x.png", name: value})
+
+
 def test_a_picture_has_the_options_of_the_encoder_with_their_ranges_and_defaults() -> None:
     part = PicturePart(file="x.png")
     told = {name: getattr(part, name) for name in PicturePart.model_fields if name != "file"}
@@ -203,10 +208,10 @@ def test_a_picture_has_the_options_of_the_encoder_with_their_ranges_and_defaults
             ranged += 1
             for good in (rule.span.low, rule.span.high):
                 number = int(good) if isinstance(rule.default, int) else good
-                assert getattr(PicturePart(file="x.png", **{name: number}), name) == number
+                assert getattr(picture_part(name, number), name) == number
             for bad in (rule.span.low - 1, rule.span.high + 1):
                 with pytest.raises(ValidationError, match=name):
-                    PicturePart(file="x.png", **{name: bad})
+                    picture_part(name, bad)
         for word in rule.choices:
-            assert getattr(PicturePart(file="x.png", **{name: word}), name) == word
+            assert getattr(picture_part(name, word), name) == word
     assert ranged == 10

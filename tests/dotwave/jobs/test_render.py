@@ -17,8 +17,10 @@ from dotwave.errors import AppError
 from dotwave.rendering.job import render_job
 from dotwave.rendering.render import render
 from dotwave.rendering.steps import write_steps
+from dotwave.reports.scene import SceneReport
 from dotwave.verification import verify
 from encoders import EncodeError, GridShape, PictureOptions, encode_picture
+from planner import plan_scene
 
 SAMPLES = Path(__file__).resolve().parents[3] / "samples"
 JOBS = sorted((SAMPLES / "jobs").glob("*.yaml"))
@@ -114,7 +116,7 @@ def test_the_tolerance_decides_what_is_ok(tmp_path: Path, monkeypatch: pytest.Mo
         for name in ("draft", "normal", "fine"):
             from dotwave.rendering import render as module
 
-            plain = module.plan_scene
+            plain = plan_scene
             monkeypatch.setattr(module, "plan_scene", lambda *a, e=error, p=plain, **k: off_by(p(*a, **k), e))
             assert render_job(job(tmp_path, text.format(name))).ok == (name in good)
             monkeypatch.setattr(module, "plan_scene", plain)
@@ -168,6 +170,7 @@ def test_the_pitch_is_that_of_the_device(tmp_path: Path) -> None:
     report = render(image_scene(HEART, device), device)
     options = PictureOptions(pitch_m=(device.pitch_m, device.pitch_m))
     expected = encode_picture(HEART, GridShape(40, 96), options).report.similarity
+    assert isinstance(report, SceneReport)
     assert report.parts == (f"icon: heart.svg, similarity {expected:.2f}",)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from drivers import FORMATS, SUFFIXES, read_exchange, read_waveform
 from encoders.braille import text as encoder
+from planner import plan_scene
 
 HEART = Path(__file__).resolve().parents[3] / "samples" / "icons" / "heart.svg"
 
@@ -60,7 +61,12 @@ def test_other_endings_are_refused_with_all_that_are_accepted(dotwave, calls, tm
 def test_a_text_is_encoded_once(dotwave, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, out: str | None) -> None:
     times = []
     plain = encoder.TextFrames._encoded
-    monkeypatch.setattr(encoder.TextFrames, "_encoded", lambda self: times.append(self) or plain(self))
+
+    def counted(self: encoder.TextFrames) -> Any:
+        times.append(self)
+        return plain(self)
+
+    monkeypatch.setattr(encoder.TextFrames, "_encoded", counted)
     written = [] if out is None else ["-o", tmp_path / out]
     ended = dotwave("text", "Hello there, it rains", "-d", "linked-6x6", *written)
     assert ended.code == 0
@@ -86,10 +92,8 @@ def test_without_a_tolerance_no_frame_is_held_to_one(dotwave, monkeypatch: pytes
 
     from dotwave.rendering import render as module
 
-    plain = module.plan_scene
-
     def off(*given: Any, **named: Any) -> Any:
-        plan = plain(*given, **named)
+        plan = plan_scene(*given, **named)
         frames = [replace(one, states=tuple(replace(state, error=0.05) for state in one.states)) for one in plan.frames]
         return replace(plan, frames=frames)
 

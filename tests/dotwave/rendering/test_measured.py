@@ -76,11 +76,11 @@ class Real:
         for row in range(self.device.rows):
             for first in range(0, self.device.cols, n):
                 part = slice(first, first + n)
-                own = [one[row, part, None, None] for one in (self.natural**2, self.delta, self.beta)]
+                natural, delta, beta = (one[row, part, None, None] for one in (self.natural, self.delta, self.beta))
                 force = np.zeros((n, 1, len(DRIVES_V)), dtype=np.complex128)
                 force[0] = self.per_volt * np.array(DRIVES_V)
                 lam = np.append(0.0, self.lam[row, first + 1 : first + n])[:, None, None]
-                seen = march(BatchParts(*own, np.ones((n, 1, 1))), force, lam, omega).phasor
+                seen = march(BatchParts(natural**2, delta, beta, np.ones((n, 1, 1))), force, lam, omega).phasor
                 noise = rng.standard_normal(seen.shape) + 1j * rng.standard_normal(seen.shape)
                 seen = seen + NOISE * np.abs(seen).max(axis=(1, 2), keepdims=True) * noise
                 for m, k, drive in np.ndindex(seen.shape):
@@ -132,7 +132,8 @@ def test_a_biased_device_is_planned_with_what_was_measured(tmp_path: Path) -> No
 def test_a_manifest_is_verified_with_its_own_actuators(tmp_path: Path) -> None:
     """Drive, links, stiffness, damping and cubic term of every actuator count: each alone spoils a plan without it."""
     real = Real.drawn("linked-6x6", seed=8)
-    plain = Real(real.device, *(np.ones((6, 6)) * v for v in (1.0, 5.3006e-3, -1.0, LAM_SET)), per_volt=2e-3)
+    every = np.ones((6, 6))
+    plain = Real(real.device, every, 5.3006e-3 * every, -1.0 * every, LAM_SET * every, per_volt=2e-3)
     # Damping and the cubic term matter little so far from resonance; what they change must be seen all the same.
     seen = {"natural": 0.02, "delta": 1e-5, "beta": 1e-4, "lam": 0.02, "per_volt": 0.02}
     for field, least in seen.items():
@@ -146,7 +147,8 @@ def test_a_manifest_is_verified_with_its_own_actuators(tmp_path: Path) -> None:
 def test_a_wave_goes_its_way_with_links_and_drives_as_they_are(tmp_path: Path) -> None:
     """Every lam makes 1.05 and every drive 1.1 of what it is set to: the wave stands as on the device without."""
     plain = load_device("paper-6x6")
-    real = Real(plain, *(np.full((6, 6), one) for one in (1.0, plain.delta, plain.beta, 1.05 * LAM_SET)), 2.2e-3)
+    every = np.ones((6, 6))
+    real = Real(plain, every, plain.delta * every, plain.beta * every, 1.05 * LAM_SET * every, 2.2e-3)
     wave = 0.1 * np.exp(-0.5j * np.pi * np.arange(6))[None].repeat(6, axis=0)
     scene = Scene(GridShape(6, 6), [Frame(TargetPattern(wave, phase_matters=True), 8.0)])
     device = real.profile()

@@ -38,7 +38,9 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[SceneReport, Pat
     folder = tmp_path_factory.mktemp("spread")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DOTWAVE_CACHE", str(folder / "cache"))
-        return render_job(write_job(folder, ", spread: {frequency: 0.01}")), folder
+        report = render_job(write_job(folder, ", spread: {frequency: 0.01}"))
+    assert isinstance(report, SceneReport)
+    return report, folder
 
 
 def nominal_median(omega: float) -> float:
