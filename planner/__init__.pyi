@@ -46,6 +46,9 @@ from .identification.calibration import (
     SweepError as SweepError,
     fit_chain as fit_chain,
 )
+from .identification.measurement import (
+    Measured as Measured,
+)
 from .operating_point import (
     Margins as Margins,
     OperatingPoint as OperatingPoint,

@@ -1,0 +1,32 @@
+"""What was measured of a page while it stood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Measured"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """How every actuator moved while a frame stood: u(tau) = mean + Re(harmonic e^{i omega tau}).
+
+    Attributes
+    ----------
+    frame : number of the frame on the time line, from 0.
+    mean : float64, shape (actuators,), row by row, dimensionless (`Device.full_scale` is what is felt as 1).
+    harmonic : complex128, shape (actuators,), dimensionless, its phase that against the drive of the actuator's chain
+        (negative = lag); NaN where nothing was measured. Of amplitudes alone the phase says nothing.
+    """
+
+    frame: int
+    mean: NDArray[np.float64]
+    harmonic: NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        if self.mean.ndim != 1 or self.mean.shape != self.harmonic.shape:
+            shapes = f"{self.mean.shape} and {self.harmonic.shape}"
+            raise ValueError(f"measured: expected one mean and one harmonic an actuator, got {shapes}")
