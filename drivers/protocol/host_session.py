@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
+from planner import Measured
+
 from ..errors import DriverError
 from .cobs import DELIMITER
+from .measured import MeasuredFrames, MeasuredPart
 from .messages import VERSION, SamplesMessage, StartMessage
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
@@ -74,6 +77,7 @@ class StreamReport:
     buffer_s : what the controller has room for.
     longest_pause_s : longest time in which the host sent nothing, because its machine was busy with other things or the
         line took nothing.
+    measured : frames of which a measurement came.
     """
 
     samples: int = 0
@@ -89,6 +93,7 @@ class StreamReport:
     least_buffer_s: float = math.inf
     buffer_s: float = 0.0
     longest_pause_s: float = 0.0
+    measured: int = 0
 
 
 class _Phase(Enum):
@@ -106,9 +111,18 @@ class HostSession:
     ----------
     make : gives the messages for the controller that answers.
     session : any number from 1 to 2^32 - 1.
+    on_measured : gets what was measured of each frame, in order. A frame whose packets the line lost is not among them,
+        and none is where the controller does not measure.
     """
 
-    def __init__(self, make: Callable[[Capabilities], Iterator[Message]], *, session: int, timing: Timing) -> None:
+    def __init__(
+        self,
+        make: Callable[[Capabilities], Iterator[Message]],
+        *,
+        session: int,
+        timing: Timing,
+        on_measured: Callable[[Measured], None] | None = None,
+    ) -> None:
         self._make = make
         self._session = session
         self._timing = timing
@@ -123,6 +137,8 @@ class HostSession:
         self._hello_at = self._sent_at = -math.inf
         self._polled_at = math.inf
         self._first_mark: tuple[float, Marked] | None = None
+        self._on_measured = on_measured
+        self._frames: MeasuredFrames | None = None
         self.capabilities: Capabilities | None = None
         self.report = StreamReport()
 
@@ -167,6 +183,8 @@ class HostSession:
                 self._acknowledged(ack, now)
             elif packet.kind is Kind.MARKED:
                 self._marked(Marked.of(packet), now)
+            elif packet.kind is Kind.MEASURED:
+                self._measured(MeasuredPart.of(packet))
             elif packet.kind is Kind.REFUSED:
                 refused = Refused.of(packet)
                 raise ControllerRefused(f"the controller refused packet {refused.number}: {refused.why}")
@@ -228,6 +246,7 @@ class HostSession:
             self._messages = self._make(found)
             self.capabilities = found
             self.report.buffer_s = found.buffer_samples / found.rate_hz
+            self._frames = MeasuredFrames(self._session, found.rows * found.cols)
         elif begun and found.session != self._session:
             raise SessionLost(
                 f"controller {found.name!r} came back without the session, at {self.played_s:.3f} s; play again"
@@ -268,3 +287,10 @@ class HostSession:
         wanted_s = (marked.at - first.at) / self.capabilities.rate_hz
         self.report.late_s[marked.frame] = 1e-6 * (marked.clock_us - first.clock_us) - wanted_s
         self.report.reported_late_s[marked.frame] = now - began - wanted_s
+
+    def _measured(self, part: MeasuredPart) -> None:
+        measured = None if self._frames is None else self._frames.take(part)
+        if measured is not None:
+            self.report.measured += 1
+            if self._on_measured is not None:
+                self._on_measured(measured)

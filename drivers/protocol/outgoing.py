@@ -14,6 +14,7 @@ from ..errors import DriverError
 from ..formats.samples import SampleReader
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
+from .measured import Measure, turns_of
 from .messages import FULL_CODE, VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
@@ -106,7 +107,9 @@ def session_messages(
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
     yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
-    waiting = merge(_links(manifest, found), _marks(manifest, found), key=lambda event: event.at)
+    waiting = merge(
+        _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
+    )
     event = next(waiting, None)
     most = SamplesMessage.most(found.channels, found.max_payload)
     block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * manifest.rate_hz)))
@@ -137,6 +140,26 @@ def _links(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
 def _marks(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     for number, mark in enumerate(manifest.frames):
         yield Mark(round(mark.start_s * manifest.rate_hz), number, _fitting(frame_note(mark), found, 12))
+
+
+def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+    """A window for each frame, where the controller measures: the second half of the time its pattern stands.
+
+    What is left there of the way in, where actuators are not as planned, has had the first half to fade.
+    """
+    if not found.measures:
+        return
+    device, rate = manifest.device, manifest.rate_hz
+    for number, mark in enumerate(manifest.frames):
+        at, stop = round((mark.settled_s + mark.end_s) / 2 * rate), round(mark.end_s * rate)
+        turns = [
+            turns_of(omega, device.tau_per_s / rate) if moving else 0
+            for omega, moving in zip(mark.omega.tolist(), mark.moving, strict=True)
+        ]
+        while len(turns) > 1 and turns[-1] == turns[-2]:
+            turns.pop()
+        if stop > at and len(turns) <= Measure.most(found.max_payload):
+            yield Measure(at, stop - at, number, tuple(turns))
 
 
 def _fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:

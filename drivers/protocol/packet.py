@@ -44,13 +44,15 @@ class Kind(IntEnum):
     MARK = 0x14
     SAMPLES = 0x15
     END = 0x16
+    MEASURE = 0x17
     CAPABILITIES = 0x81
     ACK = 0x82
     MARKED = 0x83
     REFUSED = 0x84
+    MEASURED = 0x85
 
 
-ORDERED = frozenset({Kind.START, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.MARK, Kind.SAMPLES, Kind.END})
+ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.MEASURE)
 
 
 class Shape(NamedTuple):
@@ -72,10 +74,12 @@ SHAPES = {
     Kind.MARK: Shape(12, 1),
     Kind.SAMPLES: Shape(10, 2),
     Kind.END: Shape(8, 0),
+    Kind.MEASURE: Shape(16, 8),
     Kind.CAPABILITIES: Shape(45, 1),
     Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),
     Kind.REFUSED: Shape(4, 1),
+    Kind.MEASURED: Shape(10, 12),
 }
 
 

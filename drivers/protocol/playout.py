@@ -14,6 +14,7 @@ from chainsim import Device
 
 from ..channels import channels_of
 from .early import MOST_EARLY
+from .measured import Measure
 from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Tones
 from .replies import Marked, State
 from .synthesis import Glide, ToneMix
@@ -21,7 +22,7 @@ from .synthesis import Glide, ToneMix
 __all__ = ["BUFFER_S", "ControllerSpec", "Event", "OutputBlock", "Playout"]
 
 Floats = NDArray[np.float64]
-Event = LinkCoupling | Bias | Tones | Mark
+Event = LinkCoupling | Bias | Tones | Mark | Measure
 
 BLOCK = 256
 BUFFER_S = 2.0  # what a host on a busy machine needs; see PROTOCOL.md
@@ -247,7 +248,7 @@ class Playout:
                 self._lam[event.row] = self._lam[event.row].then(event.at, event.ramp, lam)
             elif isinstance(event, Bias):
                 self._bias[event.channel] = self._bias[event.channel].then(event.at, event.ramp, [event.volts])
-            else:
+            elif isinstance(event, Tones):
                 self._tones[event.channel].change(event.at, event.ramp, event.tones)
 
     def _next(self, count: int) -> Floats:

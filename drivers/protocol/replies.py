@@ -12,6 +12,10 @@ from .packet import Kind, Packet
 __all__ = ["Ack", "Capabilities", "Flag", "Marked", "Refused", "State"]
 
 
+ABILITIES_SINCE = 3  # the version from which on CAPABILITIES has a byte of flags before the name
+MEASURES = 1  # its bit
+
+
 class State(IntEnum):
     """What the controller's output does."""
 
@@ -47,6 +51,8 @@ class Capabilities:
     ramp_ms : how long the ramp to zero takes.
     session : of the host it is serving, 0 for none.
     next_number : the ordered packet it waits for.
+    name : for people.
+    measures : whether it answers MEASURE; said from version 3 on.
     """
 
     version: int
@@ -66,6 +72,7 @@ class Capabilities:
     session: int
     next_number: int
     name: str = ""
+    measures: bool = False
 
     _struct: ClassVar = struct.Struct("<HHHHIBIHHfffHHII")
 
@@ -76,13 +83,16 @@ class Capabilities:
             self.event_slots, self.max_payload, self.full_volts, self.lam_step, self.lam_max, self.watchdog_ms,
             self.ramp_ms, self.session, self.next_number,
         )  # fmt: skip
-        return Packet(Kind.CAPABILITIES, 0, self._struct.pack(*numbers) + self.name.encode()[:80])
+        abilities = bytes([self.measures]) if self.version >= ABILITIES_SINCE else b""
+        return Packet(Kind.CAPABILITIES, 0, self._struct.pack(*numbers) + abilities + self.name.encode()[:80])
 
     @classmethod
     def of(cls, packet: Packet) -> Capabilities:
         """From bytes."""
-        name = packet.payload[cls._struct.size :].decode("utf-8", "replace")
-        return cls(*(*cls._struct.unpack_from(packet.payload), name))
+        numbers, rest = cls._struct.unpack_from(packet.payload), packet.payload[cls._struct.size :]
+        told = 1 if numbers[0] >= ABILITIES_SINCE else 0
+        measures = bool(int.from_bytes(rest[:told]) & MEASURES)
+        return cls(*(*numbers, rest[told:].decode("utf-8", "replace"), measures))
 
 
 @dataclass(frozen=True)

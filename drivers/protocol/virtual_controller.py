@@ -12,7 +12,9 @@ from functools import partial
 from typing import Protocol
 
 from .early import EarlyPackets
+from .measured import Measure, parts_of
 from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
+from .metering import Meter, Senses
 from .packet import MAX_PAYLOAD, ORDERED, Kind, Packet, PacketReader, encode
 from .playout import ControllerSpec, Event, OutputBlock, Playout
 from .replies import Ack, Capabilities, Flag, Refused, State
@@ -56,6 +58,7 @@ class VirtualController:
     name : for its greeting.
     on_output : gets every block that goes out.
     recorder : gets everything that arrives, once and in order.
+    senses : what the actuators sense of themselves; None: it does not measure.
     """
 
     def __init__(
@@ -66,10 +69,13 @@ class VirtualController:
         name: str = "virtual",
         on_output: Callable[[OutputBlock], None] | None = None,
         recorder: Recorder | None = None,
+        senses: Senses | None = None,
     ) -> None:
         self.spec = spec
         self.name = name
-        self.playout = Playout(spec, now, on_output)
+        self._on_output = on_output
+        self._meter = None if senses is None else Meter(spec.rows, spec.cols, senses)
+        self.playout = Playout(spec, now, on_output if self._meter is None else self._put_out)
         self.session = 0
         self._recorder = recorder
         self._reader = PacketReader()
@@ -122,7 +128,16 @@ class VirtualController:
     def _advance(self, now: float) -> None:
         for marked in self.playout.advance(now):
             self._send(marked.packet())
+        for measured in () if self._meter is None else self._meter.finished():
+            for part in parts_of(measured, self.session):
+                self._send(part.packet())
         self._now = now
+
+    def _put_out(self, block: OutputBlock) -> None:
+        assert self._meter is not None
+        self._meter.take(block)
+        if self._on_output is not None:
+            self._on_output(block)
 
     def _send(self, packet: Packet) -> None:
         self._out += encode(packet)
@@ -135,7 +150,7 @@ class VirtualController:
         elif packet.kind is Kind.STOP:
             self.playout.hold(State.STOPPED)
             self.playout.clear()
-            self._early.clear()
+            self._forget()
             self.session, self._ack_due = 0, True
         elif packet.kind in (Kind.STATUS, Kind.HEARTBEAT):
             self._ack_due = True
@@ -173,10 +188,15 @@ class VirtualController:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
         self.playout.begin(start.parametric)
-        self._early.clear()
+        self._forget()
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
             self._recorder.start(start)
+
+    def _forget(self) -> None:
+        self._early.clear()
+        if self._meter is not None:
+            self._meter.clear()
 
     def _carry_out(self, packet: Packet) -> None:
         if self.playout.state is State.STOPPED:
@@ -204,25 +224,35 @@ class VirtualController:
             self._recorder.samples(samples.codes)
 
     def _event(self, event: Event) -> None:
-        playout, spec = self.playout, self.spec
+        playout = self.playout
         if event.at < max(playout.last_event_at, playout.played):
             raise _Refusal(f"an event at sample {event.at} comes too late")
-        if self._events >= playout.events_done + spec.event_slots:
+        if self._events >= playout.events_done + self.spec.event_slots:
             raise _Refusal("more events than the credit allows")
+        self._check(event)
+        self._events += 1
+        playout.push_event(event)
+        if isinstance(event, Measure) and self._meter is not None:
+            self._meter.ask(event)
+        if self._recorder is not None:
+            self._recorder.event(event)
+
+    def _check(self, event: Event) -> None:
+        spec = self.spec
         if isinstance(event, LinkCoupling):
             fits = event.row < spec.rows and len(event.codes) == spec.cols - 1
             if not fits or max(event.codes, default=0) * spec.lam_step > spec.lam_max * (1 + 1e-6):
                 raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most {spec.lam_max}")
+        elif isinstance(event, Measure):
+            if self._meter is None or not event.samples or not 1 <= len(event.turns) <= spec.rows:
+                why = f"at least 1 sample and phases of 1 to {spec.rows} rows"
+                raise _Refusal(f"measure: {why}" if self._meter else "this controller does not measure")
         elif not isinstance(event, Mark):
             volts = [event.volts] if isinstance(event, Bias) else [tone.volts for tone in event.tones]
             rest = [] if isinstance(event, Bias) else [n for tone in event.tones for n in (tone.hz, tone.phase)]
             fits = event.channel < spec.channels and all(map(math.isfinite, (*volts, *rest)))
             if not fits or sum(map(abs, volts)) > spec.full_volts:
                 raise _Refusal(f"channels 0..{spec.channels - 1}, at most {spec.full_volts:g} V in all")
-        self._events += 1
-        playout.push_event(event)
-        if self._recorder is not None:
-            self._recorder.event(event)
 
     def _end(self, total: int) -> None:
         if total != self._total or (not self.playout.parametric and total != self.playout.received):
@@ -239,6 +269,7 @@ class VirtualController:
             full_volts=spec.full_volts, lam_step=spec.lam_step, lam_max=spec.lam_max,
             watchdog_ms=round(spec.watchdog_s * 1000), ramp_ms=round(spec.ramp_s * 1000),
             session=self.session, next_number=self._next if self.session else 0, name=self.name,
+            measures=self._meter is not None,
         )  # fmt: skip
 
     def _ack(self) -> Ack:
@@ -261,5 +292,6 @@ def _event(packet: Packet) -> Event:
         Kind.BIAS: Bias,
         Kind.TONES: Tones,
         Kind.MARK: Mark,
+        Kind.MEASURE: Measure,
     }
     return kinds[packet.kind].of(packet)

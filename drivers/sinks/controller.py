@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from planner import Measured
+
 from ..formats.samples import SampleReader
 from ..protocol.host_session import HostSession, StreamReport, Timing
 from ..protocol.outgoing import session_messages
@@ -28,11 +30,13 @@ class Controller:
     port : such as /dev/ttyACM0.
     baud : bits per second, None: the controller's own.
     patience_s : how long to wait for a controller that is not heard.
+    on_measured : gets what the controller measured of each frame, where it does.
     """
 
     port: str
     baud: int | None = None
     patience_s: float = 10.0
+    on_measured: Callable[[Measured], None] | None = None
 
     def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
         """Nothing more than the gate asks: what the controller can do is known once it answers."""
@@ -50,8 +54,9 @@ class Controller:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
         session = HostSession(
-            lambda found: session_messages(manifest, samples, found, session=number), session=number, timing=Timing()
-        )
+            lambda found: session_messages(manifest, samples, found, session=number),
+            session=number, timing=Timing(), on_measured=self.on_measured,
+        )  # fmt: skip
         run_session(session, self._line, patience_s=self.patience_s, progress=progress)
         stream = session.report
         rounding = f"off by at most {1e3 * manifest.device.amplifier.volts / 65534:.2f} mV"
@@ -94,6 +99,7 @@ def _lines(stream: StreamReport) -> tuple[str, ...]:
         f"{stream.underruns} underruns, {stream.lost_s:.2f} s lost, least in store "
         f"{1e3 * _finite(stream.least_buffer_s):.0f} ms, frames within {late:.1f} ms of their marks, reported "
         f"within {reported:.1f} ms",
+        *([f"{stream.measured} frames measured"] if stream.measured else []),
     )
 
 

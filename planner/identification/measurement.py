@@ -12,14 +12,18 @@ __all__ = ["Measured"]
 
 @dataclass(frozen=True)
 class Measured:
-    """How every actuator moved while a frame stood: u(tau) = mean + Re(harmonic e^{i omega tau}).
+    """How every actuator moved while a frame stood: z(tau) = mean + Re(harmonic e^{i omega tau}).
+
+    omega is that of the frame in the actuator's row. tau = 2 pi f0_hz t is counted from the start of the plan, which is
+    sample 0 of its waveform, as that of the drive is: where a chain is driven by `OperatingPoint.epsilon`, `harmonic`
+    compares with its `phasor`, and ``harmonic e^{-i arg epsilon}`` has its phases against the drive.
 
     Attributes
     ----------
     frame : number of the frame on the time line, from 0.
     mean : float64, shape (actuators,), row by row, dimensionless (`Device.full_scale` is what is felt as 1).
-    harmonic : complex128, shape (actuators,), dimensionless, its phase that against the drive of the actuator's chain
-        (negative = lag); NaN where nothing was measured. Of amplitudes alone the phase says nothing.
+    harmonic : complex128, shape (actuators,), dimensionless; NaN where nothing was measured, as in rows that are
+        held still. Of amplitudes alone the phase says nothing.
     """
 
     frame: int
