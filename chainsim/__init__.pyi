@@ -43,6 +43,9 @@ from .effects.ode import (
 from .effects.rungs import (
     solve_with_terms as solve_with_terms,
 )
+from .effects.sampled import (
+    SampledGrid as SampledGrid,
+)
 from .effects.steady import (
     Steady as Steady,
     steady_with_terms as steady_with_terms,
@@ -62,6 +65,10 @@ from .equations.coupling import (
 from .errors import (
     ChainError as ChainError,
     ProfileError as ProfileError,
+)
+from .files.effects_section import (
+    CreepSection as CreepSection,
+    HysteresisSection as HysteresisSection,
 )
 from .files.simulation import (
     Simulation as Simulation,

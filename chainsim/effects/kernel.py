@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..inlined import inlined
 
-__all__ = ["Plant", "advance"]
+__all__ = ["Plant", "advance", "beside", "push_plays", "slope"]
 
 Floats = NDArray[np.float64]
 
@@ -109,8 +109,11 @@ def _force(m: int, e: float, change: float, state: Floats, play: Floats, plant: 
 
 
 @compiled
-def _slope(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats, out: Floats) -> None:
-    """`scratch` has two rows for the tips and one, of three or more numbers, for the drive."""
+def slope(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats, out: Floats) -> None:
+    """The rates of the whole state.
+
+    `scratch` has two rows for the tips and one, of three or more numbers, for the drive.
+    """
     n, modes, first = len(plant.lam), len(plant.modes), 3 + len(plant.creep)
     drive = scratch[2]
     _drive(tau, plant, state[n, 0], drive)
@@ -131,7 +134,7 @@ def _slope(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Float
 
 
 @inlined
-def _beside(state: Floats, h: float, work: Floats, k: int) -> None:
+def beside(state: Floats, h: float, work: Floats, k: int) -> None:
     """work[4] = state + h work[k]."""
     for m in range(state.shape[0]):
         for j in range(state.shape[1]):
@@ -142,20 +145,21 @@ def _beside(state: Floats, h: float, work: Floats, k: int) -> None:
 def _step(tau: float, h: float, state: Floats, play: Floats, plant: Plant, scratch: Floats, work: Floats) -> None:
     """One step of the classical method in place; `work` has room for four slopes and a state."""
     here = work[4]
-    _slope(tau, state, play, plant, scratch, work[0])
-    _beside(state, 0.5 * h, work, 0)
-    _slope(tau + 0.5 * h, here, play, plant, scratch, work[1])
-    _beside(state, 0.5 * h, work, 1)
-    _slope(tau + 0.5 * h, here, play, plant, scratch, work[2])
-    _beside(state, h, work, 2)
-    _slope(tau + h, here, play, plant, scratch, work[3])
+    slope(tau, state, play, plant, scratch, work[0])
+    beside(state, 0.5 * h, work, 0)
+    slope(tau + 0.5 * h, here, play, plant, scratch, work[1])
+    beside(state, 0.5 * h, work, 1)
+    slope(tau + 0.5 * h, here, play, plant, scratch, work[2])
+    beside(state, h, work, 2)
+    slope(tau + h, here, play, plant, scratch, work[3])
     for m in range(state.shape[0]):
         for j in range(state.shape[1]):
             state[m, j] += (h / 6) * (work[0, m, j] + 2 * work[1, m, j] + 2 * work[2, m, j] + work[3, m, j])
 
 
 @inlined
-def _push_plays(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats) -> None:
+def push_plays(tau: float, state: Floats, play: Floats, plant: Plant, scratch: Floats) -> None:
+    """Let the plays follow the electric force that is there."""
     n = len(plant.lam)
     _drive(tau, plant, state[n, 0], scratch[2])
     _tips(state, plant, scratch)
@@ -180,7 +184,7 @@ def advance(
             tau = begin + (k * every + j) * h
             _step(tau, h, state, play, plant, scratch, work)
             if len(plant.radius):
-                _push_plays(tau + h, state, play, plant, scratch)
+                push_plays(tau + h, state, play, plant, scratch)
         _tips(state, plant, scratch)
         for m in range(n):
             if not abs(state[m, 0]) <= limit:

@@ -1,4 +1,4 @@
-"""The section `terms:` of a chain file, read into `Terms`."""
+"""The section `terms:` of a chain file, read into `Terms`; a plant file has two of its parts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ..effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Play, Terms, Tone
 from ..equations.chain import Setting
 
-__all__ = ["TermsSection"]
+__all__ = ["CreepSection", "HysteresisSection", "TermsSection"]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -26,7 +26,14 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class _Hysteresis(_Part):
+class HysteresisSection(_Part):
+    """Hysteresis as a file has it.
+
+    Attributes
+    ----------
+    kind : bouc_wen (gain, loading, unloading) or play (radius, weight, base).
+    """
+
     kind: Literal["bouc_wen", "play"]
     gain: Finite | None = None
     loading: Finite | None = None
@@ -36,7 +43,7 @@ class _Hysteresis(_Part):
     base: Finite | None = None
 
     @model_validator(mode="after")
-    def _fits_its_kind(self) -> _Hysteresis:
+    def _fits_its_kind(self) -> HysteresisSection:
         wanted, given = set(FIELDS[self.kind]), self.model_fields_set - {"kind"}
         if given != wanted:
             raise ValueError(f"kind {self.kind} takes {', '.join(FIELDS[self.kind])}, got {', '.join(sorted(given))}")
@@ -44,25 +51,29 @@ class _Hysteresis(_Part):
         return self
 
     def built(self) -> BoucWen | Play:
+        """The term."""
         if self.gain is not None and self.loading is not None and self.unloading is not None:
             return BoucWen(self.gain, self.loading, self.unloading)
         return Play(tuple(self.radius or ()), tuple(self.weight or ()), self.base or 0.0)
 
 
-class _Creep(_Part):
+class CreepSection(_Part):
+    """Creep as a file has it: per_decade, first, last (tau), each."""
+
     per_decade: Finite
     first: Positive
     last: Positive
     each: Annotated[int, Field(ge=1, le=8)] = 2
 
     @model_validator(mode="after")
-    def _in_order(self) -> _Creep:
+    def _in_order(self) -> CreepSection:
         if self.last > self.first * 10.0**MOST_DECADES:
             raise ValueError(f"creep.last: expected at most {MOST_DECADES} decades after first, got {self.last}")
         self.built()
         return self
 
     def built(self) -> Creep:
+        """The term."""
         return Creep(self.per_decade, self.first, self.last, self.each)
 
 
@@ -100,8 +111,8 @@ class TermsSection(_Part):
     tones : epsilon, omega, phase of each tone beside the setting's own.
     """
 
-    hysteresis: _Hysteresis | None = None
-    creep: _Creep | None = None
+    hysteresis: HysteresisSection | None = None
+    creep: CreepSection | None = None
     modes: Annotated[list[_Mode], Field(min_length=1, max_length=MOST_MODES)] | None = None
     amplifier: _Amplifier | None = None
     tones: Annotated[list[_Tone], Field(min_length=1, max_length=MOST_TONES)] | None = None
