@@ -75,6 +75,11 @@ from .protocol.packet import (
     Packet as Packet,
     PacketReader as PacketReader,
 )
+from .protocol.plant_file import (
+    PlantError as PlantError,
+    PlantFile as PlantFile,
+    read_plant as read_plant,
+)
 from .protocol.playout import (
     BUFFER_S as BUFFER_S,
     ControllerSpec as ControllerSpec,

@@ -83,6 +83,7 @@ def emulate(
     device: Device = "paper-6x6",
     link: Annotated[Path | None, typer.Option(help="A stable name for the port (a symbolic link).")] = None,
     record: Annotated[Path | None, typer.Option("--record", "-o", help="A .wav for what arrives.")] = None,
+    plant: Annotated[Path | None, typer.Option(help="How the grid truly is (YAML); it then measures.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long; default: Ctrl-C.")] = None,
     once: Annotated[bool, typer.Option("--once", help="Stop when the first session has ended.")] = False,
     buffer: Annotated[float, typer.Option(help="Seconds the controller can store.")] = 2.0,
@@ -114,7 +115,7 @@ def emulate(
         disconnect=parse_window(disconnect, "disconnect"),
     )  # fmt: skip
     report = run(
-        device=device, link=link, record=record, seconds=seconds, once=once, buffer_s=buffer, watchdog_s=watchdog,
-        drift_ppm=drift, faults=faults, seed=seed,
+        device=device, link=link, record=record, plant=plant, seconds=seconds, once=once, buffer_s=buffer,
+        watchdog_s=watchdog, drift_ppm=drift, faults=faults, seed=seed,
     )  # fmt: skip
     finish(report, as_json, ok=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import load_device
-from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, FaultWindow
+from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, FaultWindow, read_plant
 
 from ..errors import AppError
 from ..plain import printable
@@ -70,6 +70,7 @@ def emulate(
     device: str,
     link: Path | None = None,
     record: Path | None = None,
+    plant: Path | None = None,
     seconds: float | None = None,
     once: bool = False,
     buffer_s: float = BUFFER_S,
@@ -86,6 +87,7 @@ def emulate(
     device : profile name or file.
     link : a stable name for the port.
     record : a .wav for what arrives.
+    plant : file of how the grid truly is; with it the controller measures.
     buffer_s, watchdog_s, drift_ppm : of the controller.
     faults : what to spoil, the same each time for a `seed`.
     out : where to draw; stderr by default. A terminal is redrawn, anything else gets the port's name only.
@@ -95,7 +97,7 @@ def emulate(
     AppError
         When a number is out of range.
     ChainError, DriverError
-        When the profile, the port or the record cannot be made.
+        When the profile, the plant, the port or the record cannot be made.
     """
     for name, value in (("buffer", buffer_s), ("watchdog", watchdog_s)):
         if not 0.01 <= value <= 60:
@@ -103,7 +105,8 @@ def emulate(
     out = out or sys.stderr
     profile = load_device(device)
     spec = ControllerSpec.of(profile, buffer_s=buffer_s, watchdog_s=watchdog_s, drift_ppm=drift_ppm)
-    emulator = Emulator(profile, spec, link=link, faults=faults, seed=seed, record=record)
+    true = None if plant is None else read_plant(plant, profile)
+    emulator = Emulator(profile, spec, link=link, faults=faults, seed=seed, record=record, plant=true)
     screen = _Screen(out, profile.name, emulator.port)
     try:
         began = shown = busy = time.monotonic()

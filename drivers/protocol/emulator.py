@@ -14,6 +14,8 @@ from chainsim import Device
 
 from .faults import Faults, FaultyLine
 from .felt import FeltGrid
+from .plant import Sensors, TruePlant
+from .plant_file import PlantFile
 from .playout import ControllerSpec, OutputBlock
 from .pty_line import PtyLine
 from .record import ArrivalRecorder, CutShort
@@ -70,6 +72,7 @@ class Emulator:
     ----------
     link : a stable name for the port.
     record : a .wav for what arrives.
+    plant : how the grid truly is; with it the controller measures. None: as the profile says, and without sensors.
     on_output : gets what goes out.
 
     Raises
@@ -87,11 +90,14 @@ class Emulator:
         faults: Faults | None = None,
         seed: int = 0,
         record: Path | None = None,
+        plant: PlantFile | None = None,
         on_output: Callable[[OutputBlock], None] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._recorder = None if record is None else ArrivalRecorder(device, record)
-        self._felt = FeltGrid(device, spec.true_rate_hz)
+        rate_hz = spec.true_rate_hz
+        self._felt = FeltGrid(device, rate_hz, None if plant is None else TruePlant(plant, device, rate_hz))
+        senses = None if plant is None else Sensors(plant, device, self._felt)
         # The first block compiles the integrator: that must not happen while a host waits.
         self._felt.take(OutputBlock(0.0, np.zeros((1, spec.channels)), np.zeros((1, spec.rows, spec.cols)), 0, False))
         self._line = PtyLine(link)
@@ -106,8 +112,10 @@ class Emulator:
         self._began: float | None = None
         self._make_lines()
         self.controller = VirtualController(
-            spec, now=self._now, name=f"emulated {device.name}", on_output=self._output, recorder=self._recorder
-        )
+            spec, now=self._now, name=f"emulated {device.name}", on_output=self._output, recorder=self._recorder,
+            senses=senses,
+        )  # fmt: skip
+        self._moves_by_sensing = senses is not None
 
     @property
     def port(self) -> str:
@@ -184,6 +192,7 @@ class Emulator:
 
     def _output(self, block: OutputBlock) -> None:
         self._peak = float(np.abs(block.volts).max())
-        self._felt.take(block)
+        if not self._moves_by_sensing:
+            self._felt.take(block)
         if self._on_output is not None:
             self._on_output(block)
