@@ -26,7 +26,8 @@ def open(address: str, **options: Any) -> Player:
         ``controller:/dev/ttyACM0``, ``drv2667:/dev/ttyUSB0``, ``audio:NAME``, or a sink that another package offers;
         `dotwave ports` lists serial ports.
     **options
-        Of `dotwave play`: `baud`, `patience_s` (seconds), `firmware` of a board, `mapping` of a sound card.
+        Of `dotwave play`: `baud`, `patience_s` (seconds), `firmware` of a board, `mapping` of a sound card. And of a
+        controller that measures `on_measured`, called with each `planner.Measured`.
 
     Returns
     -------

@@ -18,6 +18,7 @@ from pydantic_core import PydanticUndefined
 import dotwave
 from chainsim import Device, load_device, read_simulation, read_sweep
 from dotwave.jobs.job import read_job
+from drivers import PlantFile, read_plant
 from tests.support.docs_pages import DOCS, ROOT, Block, blocks, read
 
 HAS_API = "device" in getattr(dotwave, "__all__", ())
@@ -35,6 +36,8 @@ def test_yaml_is_read_by_its_reader(block: Block, tmp_path: Path) -> None:
         assert read_job(file).sequence
     elif schema.startswith("dotwave/device"):
         assert load_device(str(file)).name == given["name"]
+    elif schema.startswith("dotwave/plant"):
+        assert read_plant(file, load_device("linked-6x6")).seed == given["seed"]
     elif any(isinstance(value, dict) for value in given["setting"].values()):
         assert len(read_sweep(file)) > 1
     else:
@@ -53,15 +56,24 @@ def test_python_runs(block: Block, tmp_path: Path) -> None:
 
 
 def test_every_key_of_a_device_is_told_with_its_default() -> None:
-    assert told() == dict(keys_of(Device))
+    told = keys_told("devices.md", "## Every key", "\nWithout `coupling.lam`")
+    assert told == dict(keys_of(Device))
 
 
-def told() -> dict[str, str]:
-    """Key -> default, of the table on the page."""
-    table = read(DOCS / "devices.md").partition("## Every key")[2]
-    rows = re.findall(r"^\| `([^`]+)` \|(.*)\|$", table.partition("\nWithout `coupling.lam`")[0], flags=re.MULTILINE)
+def test_every_key_of_a_plant_is_told_with_its_default() -> None:
+    told = keys_told("files.md", "## Plant files", "\nPlayed seconds")
+    # Two of its parts are those of chain files.
+    own = {key: value for key, value in keys_of(PlantFile) if not key.startswith(("hysteresis.", "creep."))}
+    assert told == own | {"hysteresis": "none", "creep": "none"}
+
+
+def keys_told(page: str, begin: str, end: str) -> dict[str, str]:
+    """Key -> default, of the table on a page between two texts."""
+    table = read(DOCS / page).partition(begin)[2].partition(end)[0]
+    rows = re.findall(r"^\| `([^`]+)` \|(.*)\|$", table, flags=re.MULTILINE)
     cells = {key: [cell.strip() for cell in rest.split("|")] for key, rest in rows}
-    assert all(len(row) == 4 and all(row) for row in cells.values())
+    assert len({len(row) for row in cells.values()}) == 1
+    assert all(all(row) for row in cells.values())
     return {key: row[-1].strip("`") for key, row in cells.items()}
 
 

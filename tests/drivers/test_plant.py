@@ -21,6 +21,8 @@ from drivers import (
     ControllerSpec,
     FeltGrid,
     HostSession,
+    Kind,
+    PacketReader,
     PlantError,
     PlantFile,
     Timing,
@@ -134,8 +136,13 @@ def test_the_same_seed_gives_the_same_bytes(plans: dict[str, tuple[Plan, Path]])
     one, again, other = (Played(path, plant) for plant in plants)
     assert one.said == again.said
     assert one.said != other.said
-    # What arrives is all that is said: no number of the plant's is in the greeting.
-    assert len({len(played.found) for played in (one, other)}) == 1
+    # A host sees of a plant what is measured, and nothing else.
+    told, rest = (
+        [packet for packet in PacketReader().feed(bytes(played.said)) if packet.kind is not Kind.MEASURED]
+        for played in (one, other)
+    )
+    assert told == rest
+    assert {packet.kind for packet in told} == {Kind.CAPABILITIES, Kind.ACK, Kind.MARKED}
 
 
 def test_noise_has_the_size_that_is_said() -> None:
@@ -283,6 +290,14 @@ def test_what_does_not_fit_is_one_line(tmp_path: Path, text: str, words: str) ->
     with pytest.raises((ProfileError, PlantError), match=words) as caught:
         emulate(device="linked-6x6", plant=path, seconds=0.0)
     assert "\n" not in str(caught.value)
+
+
+def test_the_sample_fits_the_device_it_names() -> None:
+    path = Path(__file__).resolve().parents[2] / "samples" / "plants" / "bench.yaml"
+    plant, device = read_plant(path, load_device("linked-6x6")), load_device("linked-6x6")
+    still = OutputBlock(0.0, np.zeros((3, 6)), np.zeros((3, 6, 6)), 0, live=True)
+    assert not TruePlant(plant, device, 24000).move(still).any()
+    assert len(plant.fingertips) == 2
 
 
 def test_two_fingers_may_press_one_actuator(tmp_path: Path) -> None:
