@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from drivers import (
     write_waveform,
 )
 from drivers.protocol.felt import VoltForces
+from drivers.protocol.measured import Measure
 from drivers.protocol.plant import Sensors, TruePlant, true_factors
 from drivers.protocol.playout import OutputBlock
 from encoders import GridShape, TextOptions, TextSource, encode_text
@@ -104,6 +106,30 @@ def test_a_plant_as_planned_shows_what_was_planned(plans: dict[str, tuple[Plan, 
         # What a deflection is asked for has no harmonic; where nothing is asked for there is none.
         still = found.harmonic[~moving]
         assert np.isnan(still).all() if name == "paper-6x6" else not still.any()
+
+
+def test_a_host_asks_those_who_measure_for_every_frame(plans: dict[str, tuple[Plan, Path]]) -> None:
+    for name, (plan, path) in plans.items():
+        manifest, reader = read_waveform(path)
+        device, rate = manifest.device, manifest.rate_hz
+        senses = Sensors(PlantFile(), device, FeltGrid(device, rate))
+        found = VirtualController(ControllerSpec.of(device), now=0.0, senses=senses)._capabilities()
+        sent = [one for one in session_messages(manifest, reader, found, session=7) if isinstance(one, Measure)]
+        shown = [frame for frame in plan.frames if frame.frame is not None]
+        assert [one.frame for one in sent] == list(range(len(shown)))
+        for one, frame in zip(sent, shown, strict=True):
+            assert one.at / rate == pytest.approx((frame.settled_s + frame.end_s) / 2, abs=1 / rate)
+            assert (one.at + one.samples) / rate == pytest.approx(frame.end_s, abs=1 / rate)
+            # The phases of the last rows are sent once where they are alike.
+            turns = [*one.turns, *[one.turns[-1]] * (6 - len(one.turns))]
+            assert len(one.turns) == 1 or one.turns[-1] != one.turns[-2]
+            for row, state in enumerate(frame.states):
+                wanted = state.omega * device.f0_hz / rate if name == "linked-6x6" else 0.0
+                assert turns[row] / 2**64 == pytest.approx(wanted, abs=1e-15)
+        # Not of one that does not measure, nor where a question fits into no packet.
+        short = [replace(found, max_payload=23)] if name == "linked-6x6" else []
+        for other in (replace(found, measures=False), *short):
+            assert not any(isinstance(one, Measure) for one in session_messages(manifest, reader, other, session=7))
 
 
 def test_a_plant_with_a_known_spread_is_the_chain_solved_directly(tmp_path: Path) -> None:
