@@ -16,8 +16,8 @@ PLAY, CREEP = Play((1e-4, 4e-4), (0.1, 0.2), 0.7), Creep(0.05, 1.0, 1e3)
 
 
 def grid(shape: tuple[int, int] = (2, 6), **changes: Any) -> SampledGrid:
-    given = {"chain_length": 3, "beta": -1.0, "ring": False, "dtau": DTAU, "stiffest": 1.5} | changes
-    return SampledGrid(shape=shape, **{"hysteresis": None, "creep": None} | given)
+    given: dict[str, Any] = {"chain_length": 3, "beta": -1.0, "ring": False, "dtau": DTAU, "stiffest": 1.5}
+    return SampledGrid(shape=shape, **{"hysteresis": None, "creep": None} | given | changes)
 
 
 def swinging(samples: int, omega: float = 1.0) -> np.ndarray:

@@ -40,6 +40,7 @@ from drivers.protocol.playout import OutputBlock
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import Measured, Plan, plan_scene
 
+AS_PLANNED = PlantFile.model_validate({})
 SPREAD = {"frequency": 0.002, "damping": 0.05, "lam": 0.02, "force": 0.03}
 
 
@@ -92,7 +93,7 @@ def plans(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Plan, Pat
 def test_a_plant_as_planned_shows_what_was_planned(plans: dict[str, tuple[Plan, Path]], name: str) -> None:
     plan, path = plans[name]
     shown = [frame for frame in plan.frames if frame.frame is not None]
-    played = Played(path, PlantFile())
+    played = Played(path, AS_PLANNED)
     assert [one.frame for one in played.found] == list(range(len(shown)))
     scale = plan.device.full_scale
     for found, frame in zip(played.found, shown, strict=True):
@@ -112,7 +113,7 @@ def test_a_host_asks_those_who_measure_for_every_frame(plans: dict[str, tuple[Pl
     for name, (plan, path) in plans.items():
         manifest, reader = read_waveform(path)
         device, rate = manifest.device, manifest.rate_hz
-        senses = Sensors(PlantFile(), device, FeltGrid(device, rate))
+        senses = Sensors(AS_PLANNED, device, FeltGrid(device, rate))
         found = VirtualController(ControllerSpec.of(device), now=0.0, senses=senses)._capabilities()
         sent = [one for one in session_messages(manifest, reader, found, session=7) if isinstance(one, Measure)]
         shown = [frame for frame in plan.frames if frame.frame is not None]
@@ -137,7 +138,7 @@ def test_a_plant_with_a_known_spread_is_the_chain_solved_directly(tmp_path: Path
     plan = planned(device, "l", dwell_s=7.0)
     write_waveform(plan, tmp_path / "sent.wav")
     (found,) = Played(tmp_path / "sent.wav", plant).found
-    true, nominal = true_factors(plant, device), plan.frames[0].states
+    true, nominal = true_factors(plant, device), next(iter(plan.frames)).states
     for row, state in enumerate(nominal):
         chain = Chain.of(
             6, delta=device.delta * true["damping"][row], beta=device.beta * true["beta"][row],
@@ -183,9 +184,9 @@ def test_noise_has_the_size_that_is_said() -> None:
     assert numbers.std() == pytest.approx(1, abs=0.02)
     assert abs(numbers.mean()) < 0.02
     each = numbers.reshape(500, -1)
-    off = np.corrcoef(each.T)[np.triu_indices(each.shape[1], 1)]
+    off = np.asarray(np.corrcoef(each.T))[np.triu_indices(each.shape[1], 1)]
     assert np.abs(off).max() < 0.25
-    silent = Sensors(PlantFile(), device, FeltGrid(device, 8000))
+    silent = Sensors(AS_PLANNED, device, FeltGrid(device, 8000))
     np.testing.assert_array_equal(silent.read(still).mean, still.mean)
 
 
@@ -218,11 +219,12 @@ def deflection(plant: dict[str, Any], seconds: float, volts: float = 50.0) -> np
     """Where a bias of `volts` holds the actuators after so long; raised slowly, float64, shape (6, 6)."""
     device = load_device("paper-6x6")
     true = TruePlant(PlantFile.model_validate(plant), device.model_copy(update={"delta": 0.3}), 8000)
-    z = np.zeros((1, 6, 6))
+    z: np.ndarray = np.zeros((1, 6, 6))
     for block in range(math.ceil(seconds * 8000 / 400)):
         risen = min(1.0, (block + 1) / 20)
         z = true.move(silence(device, 400, volts * risen, played=400 * block))
-    return z[-1]
+    held: np.ndarray = z[-1]
+    return held
 
 
 def root(stiffness: float, force: float) -> float:
@@ -270,7 +272,7 @@ def test_true_numbers_that_are_given_are_not_drawn() -> None:
         np.testing.assert_array_equal(true[name], numbers)
     assert np.std(true["damping"]) == pytest.approx(0.05, rel=0.5)
     assert not (drawn["beta"] - 1).any()
-    assert not (true_factors(PlantFile(), device)["force"] - 1).any()
+    assert not (true_factors(AS_PLANNED, device)["force"] - 1).any()
 
 
 def test_blocks_do_not_matter_to_a_plant() -> None:
