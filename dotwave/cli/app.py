@@ -67,11 +67,9 @@ def text(
     ] = None,
     table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
     language: Annotated[
-        str | None, typer.Option(help="Language of the text, such as de, instead of --table.", metavar="TAG")
+        str | None, typer.Option(metavar="TAG", help="Language, such as de, instead of --table.")
     ] = None,
-    grade: Annotated[
-        Grade | None, typer.Option(help="With --language: whether words are shortened; uncontracted if not said.")
-    ] = None,
+    grade: Annotated[Grade | None, typer.Option(help="With --language; uncontracted if not said.")] = None,
     undefined: Annotated[
         Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
     ] = None,

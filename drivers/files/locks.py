@@ -14,8 +14,8 @@ __all__ = ["alone_in", "held"]
 
 # What a system says of a lock that somebody else has; anything else means that it has no such locks here.
 TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
-# Whoever renames files holds a folder for milliseconds, on a very busy machine for seconds; who holds it for longer does
-# something else there.
+# Whoever renames files holds a folder for milliseconds, on a very busy machine for seconds; who holds it for longer
+# does something else there.
 PATIENCE_S, PAUSE_S = 60.0, 0.002
 
 
