@@ -71,12 +71,12 @@ volts = wave.samples(0.0, 0.5)
 print(f"{volts.shape[0]} samples of {volts.shape[1]} channels; largest {np.abs(volts).max():.1f} V")
 
 # %%
-from matplotlib.figure import Figure  # noqa: E402
+import matplotlib.pyplot as plt  # noqa: E402
 
-figure = Figure(figsize=(7, 2.4), layout="constrained")
-axes = figure.subplots()
+figure, axes = plt.subplots(figsize=(7, 2.4), layout="constrained")
 axes.plot(np.arange(len(volts)) / wave.rate_hz, volts[:, 0], linewidth=0.5, color="black")
 axes.set(title="The drive of the first row", xlabel="time, s", ylabel="volts")
+plt.close(figure)  # once is enough: the next line shows it
 figure  # noqa: B018
 
 # %% [markdown]

@@ -104,7 +104,7 @@ class Felt(VerifyReport):
         Returns
         -------
         matplotlib.figure.Figure
-            The same in words are the lines of `dotwave.reports.spoken.spoken`, which `words` joins.
+            In a notebook it shows itself, with `words` as its alternative text.
 
         Examples
         --------
@@ -115,7 +115,7 @@ class Felt(VerifyReport):
         """
         from ..figures.felt import felt_figure
 
-        return felt_figure(self, most)
+        return felt_figure(self, most, self.words())
 
     def words(self) -> str:
         """All that `figure` shows, and more, as lines of plain text: dots as ``o`` and ``.``, levels in decibels.

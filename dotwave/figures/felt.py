@@ -11,27 +11,28 @@ from ..reports.text import VerifyReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from .shown import ShownFigure
 
 __all__ = ["felt_figure"]
 
 INCH, DISC_POINTS = 2.6, 130.0
 
 
-def felt_figure(report: VerifyReport, most: int) -> Figure:
-    """A row for each of the first `most` frames: wanted on the left, felt on the right.
+def felt_figure(report: VerifyReport, most: int, words: str) -> ShownFigure:
+    """A row for each of the first `most` frames: wanted on the left, felt on the right; `words` is the same as text.
 
     Raises
     ------
     ValueError
         When there is no frame to draw.
     """
-    from matplotlib.figure import Figure
+    from .shown import ShownFigure
 
     frames = report.frames[:most]
     if not frames:
         raise ValueError(f"figure: nothing to draw, {len(report.frames)} frames and most = {most}")
-    figure = Figure(figsize=(2 * INCH, INCH * len(frames)), layout="constrained")
+    figure = ShownFigure(words, figsize=(2 * INCH, INCH * len(frames)), layout="constrained")
     places = figure.subplots(len(frames), 2, squeeze=False)
     for number, (frame, (left, right)) in enumerate(zip(frames, places, strict=True), 1):
         _discs(left, frame.target, f"frame {number}, wanted")

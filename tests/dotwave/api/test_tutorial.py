@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import re
 import subprocess
@@ -9,6 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+
+import dotwave as dw
+from tests.support.known import known
 
 ROOT = Path(__file__).resolve().parents[3]
 TUTORIAL = ROOT / "docs" / "tutorial.py"
@@ -39,3 +43,22 @@ def test_it_becomes_a_notebook() -> None:
     jupytext = pytest.importorskip("jupytext")
     notebook = jupytext.read(TUTORIAL)
     assert [cell.cell_type for cell in notebook.cells].count("code") >= 10
+
+
+def test_what_is_felt_draws_itself_in_a_notebook_with_its_words() -> None:
+    felt = dw.verify(dw.plan(dw.text("Hi", "paper-6x6"), "paper-6x6"))
+    shown = known(felt.figure()._repr_html_())
+    found = re.fullmatch(r'<img alt="([^"]*)" src="data:image/png;base64,([^"]*)">', shown, flags=re.DOTALL)
+    assert found is not None
+    assert "Dots felt: the same." in found[1]
+    assert base64.b64decode(found[2]).startswith(b"\x89PNG")
+
+
+def test_executed_as_a_notebook_it_shows_both_figures(tmp_path: Path) -> None:
+    jupytext, client = pytest.importorskip("jupytext"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    notebook = jupytext.read(TUTORIAL)
+    notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    client.NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert sum("image/png" in data or "data:image/png" in data.get("text/html", "") for data in outputs) == 2
