@@ -58,10 +58,11 @@ class Run:
         self.slow = np.zeros((size, n), dtype=np.complex128)
         self.peak = np.zeros((size, n))
         self.evals = 0
-        back = inverse(self.flow.rate)
-        self._follows = -times(back @ self.flow.weight, np.eye(n)[0] * self.drive[:, None])
-        self._lags = times(back, self._follows)
-        self._half = np.empty_like(back)
+        self._back = inverse(self.flow.rate)
+        self._loaded = -times(self._back @ self.flow.weight, np.eye(n)[0] * self.drive[:, None])
+        self._follows = self._loaded.copy()
+        self._lags = times(self._back, self._loaded)
+        self._half = np.empty_like(self._back)
         self._made = np.zeros(size, dtype=np.int64)
         self._linear = np.abs(self.flow.rate).sum(axis=2).max(axis=1)
         self._held = np.zeros_like(self.slow)
@@ -95,14 +96,21 @@ class Run:
             raise EnvelopeError(f"start: expected finite amplitudes of shape {self.slow.shape}, got {amplitude.shape}")
         self.slow = self.flow.slow_part(np.broadcast_to(amplitude, self.slow.shape), self.drive, self.flow.lam)
 
-    def anchor(self, lanes: Lanes, orbit: Complexes) -> None:
-        """Follow `lanes` by their distance from the fixed points `orbit`, shape (len, n), from now on.
+    def hold(self, lanes: Lanes, amplitude: Complexes, calm: NDArray[np.bool_]) -> None:
+        """Follow `lanes` from now on with the cubic terms of their oscillators that are `calm` held at `amplitude`.
 
-        Steps of any length then come to rest there, and not where their own error lets them.
+        Steps integrate only what the cubic terms differ from that, so they rest where the flow does, whatever their
+        length. Else each change of the steps, made for a chain's end, would move its settled head by its own error, and
+        the chain would magnify that into the next change.
+
+        Parameters
+        ----------
+        amplitude : complex128, shape (len, n).
+        calm : bool, shape (len, n).
         """
         flow = self.flow.pick(lanes)
-        self._follows[lanes] = flow.slow_part(orbit, self.drive[lanes], flow.lam)
-        self._held[lanes] = times(flow.weight, flow.cubic(orbit))
+        self._held[lanes] = times(flow.weight, np.where(calm, flow.cubic(amplitude), 0.0))
+        self._follows[lanes] = self._loaded[lanes] + times(self._back[lanes], self._held[lanes])
 
     def amplitude(self, lanes: Lanes) -> Complexes:
         """Amplitudes of `lanes`, shape (len, n)."""

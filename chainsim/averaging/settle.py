@@ -34,6 +34,7 @@ STEADY = 3e-3  # until its frequency (relative) and its depth change less than t
 STRONGEST = 2.0  # beta a^2 beyond which the slow flow is not true of a hardening chain.
 BOUND = 1e150  # An amplitude beyond which a motion without a hilltop has run away.
 QUIETEST = 1e-4  # Depth below which a beat is none.
+EDGE = 0.92  # Of the hilltop: whether a motion that passed nearer comes back is more than the slow flow knows.
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class _Settling:
             before = way.amplitude(lanes)
             way.advance(lanes)
             here = way.amplitude(lanes)
+            way.hold(lanes, here, np.abs(here - before) <= QUIET * np.abs(here))
             seen = np.full(size, np.inf)
             seen[lanes] = _apart(before, here)
             changes.append(seen)
@@ -123,12 +125,11 @@ class _Settling:
             gone |= way.spent[lanes] | (way.strength(lanes) > STRONGEST)
             lanes, here = lanes[~gone], here[~gone]
             orbit, distance = self._orbits(lanes, here, (seen[lanes] < QUIET) | (look >= self.patience))
-            near = distance < QUIET
-            way.anchor(lanes[near], orbit[near])
             nearing = (_apart(last[lanes], orbit) < SAME) & (distance < np.maximum(SHRINKS * gap[lanes], CLOSE))
             done = nearing & (distance < NEAR)
-            self.outcome[lanes[done]], self.phasor[lanes[done]] = Outcome.OK, orbit[done]
-            self.beat[lanes[done]] = self.spread[lanes[done]] = 0.0
+            told = done & (way.peak[lanes] <= EDGE * way.top[lanes]).all(axis=1)
+            self.outcome[lanes[told]], self.phasor[lanes[told]] = Outcome.OK, orbit[told]
+            self.beat[lanes[told]] = self.spread[lanes[told]] = 0.0
             last[lanes], gap[lanes] = orbit, distance
             lost = np.zeros(len(lanes), dtype=bool)
             if look >= self.patience:

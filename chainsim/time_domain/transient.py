@@ -11,6 +11,7 @@ from ..equations.scaled_chain import ScaledChain
 from ..model.response import Outcome
 from ..threads import in_threads
 from .network import advance_network
+from .rounding import rounding_floor
 from .shooting import FAR_SMALLER, shoot
 from .splitting import WIDTH, advance_block, forcing_table
 from .stepping import coarse_steps, escape_amplitude, steps_at
@@ -27,6 +28,7 @@ _SAME = 1e-6  # Two orbits found one after the other are one orbit.
 _SHRINKS = 0.98  # Between two looks a decaying distance falls by more.
 _DRIFTS = 1e-5  # Change over one period, relative, that is motion and not the tail of a slow decay.
 _RESTS = 1e-6  # Change over one period, relative, of an oscillator that has come to rest.
+_DROWNS = 1e-3  # Of the length scale: a disturbance beyond which it is no small one, so that nothing is told below it.
 _STRONG = 0.05  # z^2 beyond which eight steps per period are too few to trust a verdict.
 _MOST_KICKS = 1_000_000_000  # Of one setting; about ten seconds.
 _MOST_STEPS = 8192  # Steps per period beyond which a setting counts as out of budget.
@@ -102,10 +104,11 @@ class _Run:
         most = min(self.max_periods, max(1, _MOST_KICKS // (7 * steps * self.scaled.n)))
         while len(lanes) and done < most:
             go = min(max(pace, int(0.15 * done)), most - done)
-            changes = self._advance(lanes, table, go)
+            before = self._advance(lanes, table, go)
             done += go
-            history.add(done, lanes, changes)
-            lanes = self._look(lanes, steps, history, done >= patience)
+            floor = self._floor(lanes, steps)
+            history.add(done, lanes, _distances(before, self.state[lanes], joint=self.scaled.joint, floor=floor))
+            lanes = self._look(lanes, steps, history, floor, done >= patience)
 
     def decide_linear(self, lanes: Lanes, steps: int) -> None:
         """The outcome of linear settings from their one orbit; a marginal one (no damping) stays undecided."""
@@ -121,7 +124,7 @@ class _Run:
         self.outcome[lanes], self.state[lanes], self.phasor[lanes] = Outcome.OK, state, phasor
 
     def _advance(self, lanes: Lanes, table: Floats, periods: int) -> Floats:
-        """Advance by whole periods; each oscillator's relative change over the last one, shape (L, n)."""
+        """Advance by whole periods; the states before the last one, shape (L, 2n)."""
         scaled, steps = self.scaled, len(table)
 
         def move(count: int) -> None:
@@ -138,23 +141,31 @@ class _Run:
         move(1)
         self.periods += periods * len(lanes)
         self.kicks += 7 * steps * periods * len(lanes) * scaled.n
-        return _distances(before, self.state[lanes], joint=scaled.joint)
+        return before
 
-    def _look(self, lanes: Lanes, steps: int, history: _History, patient: bool) -> Lanes:
+    def _floor(self, lanes: Lanes, steps: int) -> Floats:
+        """How far rounding alone may keep each oscillator from its orbit, shape (L, n)."""
+        n = self.scaled.n
+        if self.scaled.joint:
+            return np.zeros((len(lanes), n))
+        size = np.hypot(self.state[lanes, :n], self.state[lanes, n:])
+        return np.nan_to_num(rounding_floor(self.scaled, lanes, size, steps), nan=np.inf)
+
+    def _look(self, lanes: Lanes, steps: int, history: _History, floor: Floats, patient: bool) -> Lanes:
         """Settle what can be settled now; returns the settings that go on."""
         escaped = ~(np.sqrt(self.peak[lanes]) <= escape_amplitude(self.scaled))
         # What cannot run away has outrun the steps.
         self.outcome[lanes[escaped]] = Outcome.NO_CONVERGENCE if self.scaled.hardens else Outcome.ESCAPED
-        lanes = lanes[~escaped]
+        lanes, floor = lanes[~escaped], floor[~escaped]
         quiet = np.full_like(lanes, True, dtype=np.bool_) if patient else history.change(lanes) < _QUIET
-        restless, lanes = lanes[~quiet], lanes[quiet]
+        restless, lanes, floor = lanes[~quiet], lanes[quiet], np.where(floor <= _DROWNS, floor, 0.0)[quiet]
         orbits = shoot(self.scaled, lanes, self.state[lanes], steps)
         self.turns += orbits.turns
-        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.scaled.joint))
+        away = _worst(_distances(self.state[lanes], orbits.state, joint=self.scaled.joint, floor=floor))
         distance = np.where(orbits.stable, away, np.inf)
         same = _worst(_distances(self.orbit[lanes], orbits.state)) < _SAME
         nearing = same & (distance < np.maximum(_SHRINKS * self.distance[lanes], _SAME))
-        reached = nearing & (_worst(_distances(self.state[lanes], orbits.state)) < _NEAR)
+        reached = nearing & (_worst(_distances(self.state[lanes], orbits.state, floor=floor)) < _NEAR)
         self.orbit[lanes], self.distance[lanes] = orbits.state, distance
         self._accept(lanes[reached], orbits.state[reached], orbits.harmonics[reached, 1])
         lost = ~reached & ~nearing & history.recurrent(lanes) if patient else np.zeros_like(reached)
@@ -204,20 +215,20 @@ def _worst(distances: Floats) -> Floats:
     return found
 
 
-def _distances(a: Floats, b: Floats, *, joint: bool = False) -> Floats:
-    """Each oscillator's distance in its phase plane, relative to its own size in `b`; NaN becomes inf.
+def _distances(a: Floats, b: Floats, *, joint: bool = False, floor: Floats | float = 0.0) -> Floats:
+    """Each oscillator's distance in its phase plane beyond `floor`, relative to its own size in `b`; NaN becomes inf.
 
     With `joint` it is relative to the largest oscillator's size: in a ring a transient runs round through
     oscillators that will be a thousand times smaller, and their own size would hide its decay.
 
-    No size counts as smaller than 1e-9 of the largest: far down a chain the rounding of the first oscillators, ringing
-    at a resonance of every stage, is larger than the motion itself.
+    No size counts as smaller than 1e-9 of the largest: nobody feels what is.
     """
     n = a.shape[1] // 2
     size = np.hypot(b[:, :n], b[:, n:])
     size = np.maximum(size, (1.0 if joint else FAR_SMALLER) * np.max(size, axis=1, keepdims=True, initial=0.0))
     with np.errstate(invalid="ignore"):
         apart = np.hypot(a[:, :n] - b[:, :n], a[:, n:] - b[:, n:])
+        apart = np.where(np.isfinite(apart), np.maximum(apart - floor, 0.0), apart)
     nothing = np.where((apart == 0) & (size == 0), 0.0, np.inf)
     found: Floats = np.divide(apart, size, out=nothing, where=(size > 0) & np.isfinite(apart) & np.isfinite(size))
     return found
