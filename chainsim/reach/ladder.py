@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..equations.basis import basis_for
 from ..equations.chain import Chain, Setting
@@ -16,7 +16,8 @@ from ..harmonic_balance.answer import Answer, response_of, stitch
 from ..harmonic_balance.long import LONG, low_alone
 from ..harmonic_balance.rung import balance_near
 from ..model.response import Outcome, Response, Stats
-from ..rung import MAX_PERIODS, Start, load_rung
+from ..rung import MAX_PERIODS, RungError, Start, load_rung
+from .beside import beside
 from .rest import sure_from_rest
 
 if TYPE_CHECKING:
@@ -32,7 +33,9 @@ FAINT = 1e-8
 THROWN = 0.25
 
 
-def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str = "rest") -> Response:
+def solve(
+    chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", start: str | ArrayLike = "rest"
+) -> Response:
     """Periodic steady states of N settings.
 
     Parameters
@@ -45,6 +48,9 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
         that a drive raised within 100/delta ends (other rungs: `NO_CONVERGENCE`).
         ``all``, every branch of one setting, along the batch axis, the lowest first. Of a ring or a bidirectional chain
         `joint_branches` also says whether the list is complete.
+        Amplitudes, complex128, shape (N, n), for ``auto``: the motion has a way in of its own that ends there (first
+        harmonics, or deflections where nothing is driven). The answer is the stable one beside it; what a sudden drive
+        would reach is not asked, and nothing is integrated.
 
     Raises
     ------
@@ -55,13 +61,17 @@ def solve(chain: Chain, setting: Setting, *, tol: float, rung: str = "auto", sta
     """
     if not (math.isfinite(tol) and 1e-12 <= tol <= 1):
         raise ValueError(f"tol: expected a number from 1e-12 to 1, got {tol}")
-    if start not in set(Start):
-        raise ValueError(f"start: expected one of {', '.join(Start)}, got {start!r}")
-    way = Start(start)
+    if isinstance(start, str) and start not in set(Start):
+        raise ValueError(f"start: expected one of {', '.join(Start)}, or amplitudes, got {start!r}")
     if len(setting) == 0:
         raise ValueError("setting: expected at least one setting, got none")
     if setting.n != chain.n:
         raise ValueError(f"setting: made for {setting.n} oscillators, the chain has {chain.n}")
+    if not isinstance(start, str):
+        if rung != "auto":
+            raise RungError(f"rung {rung}: it does not start from amplitudes; use rung auto, or start rest or ramp")
+        return beside(chain, setting, np.asarray(start, dtype=np.complex128), tol=tol)
+    way = Start(start)
     if way is Start.ALL and lists_jointly(chain, rung):
         return every_branch(chain, setting, tol=tol, rung=rung).response
     if rung != "auto":

@@ -33,12 +33,12 @@ def rounding_floor(scaled: ScaledChain, lanes: Lanes, size: Floats, steps: int) 
 
     Returns
     -------
-    float64, shape (L, n); not finite where the gain is beyond any number, as without damping.
+    float64, shape (L, n); infinite where the gain is beyond any number, as without damping.
     """
     delta, period, count = scaled.of_each(scaled.delta), scaled.network.period[lanes], scaled.n
-    # A strong motion has its own frequency, and a disturbance of it another.
-    stiffness = scaled.k[:, lanes].T + 1.5 * scaled.of_each(scaled.sign) * size**2
     with np.errstate(all="ignore"):
+        # A strong motion has its own frequency, and a disturbance of it another.
+        stiffness = scaled.k[:, lanes].T + 1.5 * scaled.of_each(scaled.sign) * size**2
         picked = np.linspace(0, count - 1, min(count, _MOST_LINES)).round().astype(np.int64)
         square = np.sort(np.maximum(stiffness, 0.0), axis=1)[:, picked]
         lines: list[Floats] = []
@@ -50,4 +50,4 @@ def rounding_floor(scaled: ScaledChain, lanes: Lanes, size: Floats, steps: int) 
             for source, link in scaled.inputs(m):
                 force = force + np.abs(link[lanes])[:, None] * lines[source]
             lines.append(answer * force)
-        return np.stack([line.max(axis=1) for line in lines], axis=1)
+        return np.nan_to_num(np.stack([line.max(axis=1) for line in lines], axis=1), nan=np.inf, posinf=np.inf)

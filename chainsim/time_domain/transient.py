@@ -149,7 +149,7 @@ class _Run:
         if self.scaled.joint:
             return np.zeros((len(lanes), n))
         size = np.hypot(self.state[lanes, :n], self.state[lanes, n:])
-        return np.nan_to_num(rounding_floor(self.scaled, lanes, size, steps), nan=np.inf)
+        return rounding_floor(self.scaled, lanes, size, steps)
 
     def _look(self, lanes: Lanes, steps: int, history: _History, floor: Floats, patient: bool) -> Lanes:
         """Settle what can be settled now; returns the settings that go on."""

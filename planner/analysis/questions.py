@@ -103,8 +103,12 @@ def refusal(rung: str, question: Question) -> str:
 
 
 def answer(rung: str, tol: float | None, question: Question) -> Response:
-    """Solve a question; a rung that gives what it has is asked for nothing."""
-    return solve(question.chain, question.setting, tol=1.0 if tol is None else tol, rung=rung, start="rest")
+    """Solve a question; a rung that gives what it has is asked for nothing.
+
+    The plan has a way in of its own, so ``auto`` is not asked what a sudden drive would reach.
+    """
+    start = question.planned if rung == "auto" else "rest"
+    return solve(question.chain, question.setting, tol=1.0 if tol is None else tol, rung=rung, start=start)
 
 
 def felt(response: Response, question: Question) -> Complexes:

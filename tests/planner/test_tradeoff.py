@@ -13,7 +13,17 @@ from chainsim import RUNGS, Chain, Outcome, Rung, Setting, Stats, balance_near, 
 from encoders import Frame, GridShape, Scene, TextOptions, TextSource, encode_text, levels
 from planner import FramePlan, PointTone, plan_scene
 from planner.analysis.climbing import _ladder, climb
-from planner.analysis.questions import Question, TradeoffError, answer, felt, questions_of, refusal, seconds_words
+from planner.analysis.questions import (
+    FINEST,
+    TOLS,
+    Question,
+    TradeoffError,
+    answer,
+    felt,
+    questions_of,
+    refusal,
+    seconds_words,
+)
 from planner.analysis.requirement import Requirement, Term
 from planner.analysis.tradeoff import LONG_S, Tradeoff, TradeoffRow, by_clock, trade_off
 
@@ -66,6 +76,27 @@ def test_estimates_bound_the_errors_and_tolerances_are_kept(single, still):
             assert row.solved == 1
             if row.rung == "auto":
                 assert row.error <= row.tol
+
+
+@pytest.mark.parametrize("device", ["linked-6x6", "paper-6x6", "independent-6x6"])
+def test_auto_asks_only_what_the_scene_asks(device):
+    """It does at most twice the work of the cheapest rung that meets the tolerance, and starts no integration."""
+    questions, _ = questions_of(*frames_of("Hello world", device))
+    for question, tol in itertools.product(questions, TOLS):
+        tried = [rung for rung in RUNGS if rung != "ode" and not refusal(rung, question)]
+        truth = felt(answer(tried[-2] if "envelope" in tried else tried[0], FINEST, question), question)
+        size = np.abs(truth).max(axis=1)
+
+        def met(found, question=question, truth=truth, size=size, tol=tol):
+            return (np.abs(felt(found, question) - truth).max(axis=1) <= tol * size).all()
+
+        cheapest = next(found for rung in tried if met(found := answer(rung, tol, question)))
+        auto = answer("auto", tol, question)
+        assert met(auto)
+        assert auto.stats.rhs_evals == auto.stats.periods == 0
+        assert auto.stats.oscillators_solved <= 2 * cheapest.stats.oscillators_solved
+        # One that is met by less than its own estimate says may take the next.
+        assert auto.stats.newton_steps <= max(2 * cheapest.stats.newton_steps, 20 * len(question.setting))
 
 
 def test_work_grows_along_the_ladder(single):
