@@ -24,7 +24,7 @@ HERE = Path(__file__).resolve().parent
 KEPT = HERE / "results" / "auto_price.json"
 PARAGRAPH = HERE.parent / "samples" / "texts" / "paragraph.txt"
 SHAPE = GridShape(6, 6)
-GOAL, LEAST_S = 2.0, 0.2
+GOAL, LEAST_S = 2.0, 0.5
 
 
 def text(words: str) -> Scene:
