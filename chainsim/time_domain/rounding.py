@@ -50,4 +50,5 @@ def rounding_floor(scaled: ScaledChain, lanes: Lanes, size: Floats, steps: int) 
             for source, link in scaled.inputs(m):
                 force = force + np.abs(link[lanes])[:, None] * lines[source]
             lines.append(answer * force)
-        return np.nan_to_num(np.stack([line.max(axis=1) for line in lines], axis=1), nan=np.inf, posinf=np.inf)
+        floor: Floats = np.stack([line.max(axis=1) for line in lines], axis=1)
+    return np.where(np.isnan(floor), np.inf, floor)

@@ -104,14 +104,20 @@ class PlayingChain:
         """A play that waits begins to slide where e has moved by its radius; those that slide wait where e turns."""
         found = []
         for m in range(len(self.links)):
-            ways = {int(way) for way in slides[m]} - {0}
-            found += [_Corner(lambda t, y, m=m: self._pulled(t, y)[1][m], -way, m, None) for way in ways]
+            found += [self._turn(m, way) for way in (1, -1) if (slides[m] == way).any()]
             for one in np.flatnonzero(slides[m] == 0):
-                for way in (1, -1):
-                    # A drive that is cut off may stand still at the edge: that is no crossing.
-                    edge = held[m, one] + way * (self.radius[one] + STILL)
-                    found.append(_Corner(lambda t, y, m=m, e=edge: self._pulled(t, y)[0][m] - e, way, m, int(one)))
+                # A drive that is cut off may stand still at the edge: that is no crossing.
+                reach = float(self.radius[one]) + STILL
+                found += [self._edge(m, int(one), way, float(held[m, one]) + way * reach) for way in (1, -1)]
         return found
+
+    def _turn(self, m: int, way: int) -> _Corner:
+        """Where e of oscillator m, which goes `way`, turns."""
+        return _Corner(lambda tau, state: float(self._pulled(tau, state)[1][m]), -way, m, None)
+
+    def _edge(self, m: int, one: int, way: int, edge: float) -> _Corner:
+        """Where e of oscillator m passes `edge`, going `way`."""
+        return _Corner(lambda tau, state: float(self._pulled(tau, state)[0][m]) - edge, way, m, one)
 
 
 def _events(corners: list[_Corner]) -> list[Event]:
