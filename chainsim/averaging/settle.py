@@ -34,7 +34,7 @@ STEADY = 3e-3  # until its frequency (relative) and its depth change less than t
 STRONGEST = 2.0  # beta a^2 beyond which the slow flow is not true of a hardening chain.
 BOUND = 1e150  # An amplitude beyond which a motion without a hilltop has run away.
 QUIETEST = 1e-4  # Depth below which a beat is none.
-EDGE = 0.8  # Of the hilltop: whether a motion that passed nearer comes back is more than the slow flow knows.
+EDGE = 0.86  # Of the hilltop: whether a motion that passed nearer comes back is more than the slow flow knows.
 
 
 @dataclass(frozen=True)
