@@ -62,7 +62,7 @@ def solve(
     if not (math.isfinite(tol) and 1e-12 <= tol <= 1):
         raise ValueError(f"tol: expected a number from 1e-12 to 1, got {tol}")
     if isinstance(start, str) and start not in set(Start):
-        raise ValueError(f"start: expected one of {', '.join(Start)}, or amplitudes, got {start!r}")
+        raise ValueError(f"start: expected one of {', '.join(Start)}, got {start!r}")
     if len(setting) == 0:
         raise ValueError("setting: expected at least one setting, got none")
     if setting.n != chain.n:
