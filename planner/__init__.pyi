@@ -93,3 +93,9 @@ from .surroundings import (
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
 )
+from .wish import (
+    CONTRAST_LIMIT_DB as CONTRAST_LIMIT_DB,
+    DOT_THRESHOLD as DOT_THRESHOLD,
+    FrameVerdict as FrameVerdict,
+    FrameWish as FrameWish,
+)

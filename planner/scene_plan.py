@@ -25,12 +25,13 @@ __all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
 DEFAULT_CONTRAST_DB = 20.0
 
 
-def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CONTRAST_DB) -> Plan:
+def plan_scene(scene: Scene, device: Device, *, contrast_db: float | None = None) -> Plan:
     """Plan `scene` on `device`; the work is done as `Plan.frames` is read.
 
     Parameters
     ----------
-    contrast_db : how far an unraised dot of a vibrating chain stays below a raised one.
+    contrast_db : asked between raised and unraised dots, which is planned and judged. None: planned with
+        `DEFAULT_CONTRAST_DB` where chains vibrate, and judged as `FrameWish` says.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CON
     ContrastError
         When the contrast is not above 0.
     """
-    if not (math.isfinite(contrast_db) and contrast_db > 0):
+    if contrast_db is not None and not (math.isfinite(contrast_db) and contrast_db > 0):
         raise ContrastError(f"contrast: expected a number of decibels above 0, got {contrast_db:g}; 20 is usual")
     shape = (scene.shape.rows, scene.shape.cols)
     if shape != (device.rows, device.cols):
@@ -61,9 +62,9 @@ def _memory_of(device: Device, contrast_db: float) -> Memory:
 class _Frames:
     """The planned frames of a scene, as often as they are asked for."""
 
-    def __init__(self, scene: Scene, device: Device, contrast_db: float) -> None:
-        self._scene = scene
-        self._memory = _memory_of(device, contrast_db)
+    def __init__(self, scene: Scene, device: Device, asked_db: float | None) -> None:
+        self._scene, self._asked_db = scene, asked_db
+        self._memory = _memory_of(device, DEFAULT_CONTRAST_DB if asked_db is None else asked_db)
         self._device = device
         self._expected: Expectation | None = None
         if device.spread is not None:
@@ -98,7 +99,8 @@ class _Frames:
                 f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
-        whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
+        times = start_s, start_s + longest, end_s
+        whole = self._judged(FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db))
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
         return replace(whole, spread=self._expected.of(change.targets, change.states))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 from chainsim import Outcome
 from drivers import Encoding, Waveform, channels_of
 from encoders import Scene
-from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
+from planner import FramePlan, Plan, plan_scene
 
 from ..errors import AppError, NotMade
 from ..rendering.render import render
@@ -37,7 +37,7 @@ def plan(
     *,
     tol: float | None = None,
     budget_s: float | None = None,
-    contrast_db: float = DEFAULT_CONTRAST_DB,
+    contrast_db: float | None = None,
 ) -> ScenePlan:
     """Find the settings that make a scene on a device.
 
@@ -54,8 +54,9 @@ def plan(
         has its own.
     budget_s : float, optional
         Seconds for planning; later frames are ``out_of_budget``.
-    contrast_db : float
-        Decibels by which unraised dots of vibrating chains stay below raised ones. A job has its own.
+    contrast_db : float, optional
+        Decibels by which unraised dots stay below raised ones, planned and judged. A job has its own. Without,
+        vibrating chains are planned with 20, and 12 are enough.
 
     Returns
     -------

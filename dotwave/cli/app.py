@@ -25,7 +25,20 @@ from typer.models import CommandInfo
 from encoders import Grade, Presentation, Undefined
 
 from ..errors import Terminated
-from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
+from .command import (
+    Actuator,
+    Budget,
+    Contrast,
+    Device,
+    Explain,
+    Json,
+    Pareto,
+    Tol,
+    Written,
+    Yes,
+    finish as _finish,
+    say,
+)
 from .completion import completed_devices, completed_files, completed_texts
 from .ending import ended
 from .help import LOOK, RENDER, SET_UP, STUDY, Commands
@@ -82,9 +95,7 @@ def text(
     ] = None,
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
-    contrast: Annotated[
-        float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
-    ] = 20.0,
+    contrast: Contrast = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,

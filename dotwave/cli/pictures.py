@@ -11,7 +11,7 @@ import typer
 
 from encoders import picture_rules
 
-from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
+from .command import Actuator, Budget, Contrast, Device, Explain, Json, Pareto, Tol, Yes, finish, say
 from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
@@ -28,9 +28,6 @@ def _words(option: str) -> str:
 
 PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
 ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
-Contrast = Annotated[
-    float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
-]
 
 
 @commands.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
@@ -58,7 +55,7 @@ def image(
     edges: Annotated[bool, typer.Option("--edges", help="Outlines in place of areas.")] = False,
     zoom: Annotated[int, typer.Option(help="From 2 on: an overview, then parts of the picture.")] = 1,
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
-    contrast: Contrast = 20.0,
+    contrast: Contrast = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -113,7 +110,7 @@ def icons(
         float, typer.Option(min=0.1, help="Processor time that one icon may take; not with --scheduler.")
     ] = 20.0,
     dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
-    contrast: Contrast = 20.0,
+    contrast: Contrast = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,

@@ -265,7 +265,7 @@ class Job(Part):
     device: DevicePart = DevicePart()
     tolerance: Tolerance = "normal"
     budget: Budget | None = None
-    contrast_db: Annotated[float, Field(ge=6, le=60)] = 20.0
+    contrast_db: Annotated[float, Field(ge=6, le=60)] | None = None
     presentation: Presentation = Presentation.TOGETHER
     output: FilePath | None = None
     sample_format: Literal["float32", "pcm24"] = "float32"

@@ -48,7 +48,7 @@ class JobScene(DeviceScene):
             given,
             tol=given.tol or job.tol,
             budget_s=given.budget_s or (job.budget.planning_s if job.budget else None),
-            contrast_db=job.contrast_db,
+            contrast_db=given.contrast_db or job.contrast_db,
             encoding=job.sample_format,
         )
 
