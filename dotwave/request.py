@@ -42,6 +42,7 @@ class Request:
     explain : list what the scene requires.
     pareto : list what a frame can be bought for.
     contrast_db : how far unraised dots stay below raised ones, planned and judged.
+    yield_ : share of devices, drawn with the device's spread, that are to keep what is wished.
     encoding : number format of samples.
     actuator : (row, col) that a haptic file of one actuator shows; None is the mean over the grid.
     yes : do not ask before a very large file.
@@ -52,6 +53,7 @@ class Request:
     explain: bool = False
     pareto: FrameRequest | None = None
     contrast_db: float | None = None
+    yield_: float | None = None
     encoding: Encoding = "float32"
     actuator: tuple[int, int] | None = None
     yes: bool = False

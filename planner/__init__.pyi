@@ -39,6 +39,7 @@ from .errors import (
     DwellTooShort as DwellTooShort,
     PlanError as PlanError,
     SceneDoesNotFit as SceneDoesNotFit,
+    YieldError as YieldError,
 )
 from .identification.calibration import (
     ChainFit as ChainFit,
@@ -56,7 +57,10 @@ from .operating_point import (
 )
 from .outlook import (
     FrameSpread as FrameSpread,
+    MeansTried as MeansTried,
     TradePoint as TradePoint,
+    needed_for as needed_for,
+    spread_words as spread_words,
 )
 from .plan import (
     FramePlan as FramePlan,

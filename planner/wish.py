@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from encoders import Frame
 
-__all__ = ["CONTRAST_LIMIT_DB", "DOT_THRESHOLD", "FrameVerdict", "FrameWish", "contrast_between"]
+__all__ = ["CONTRAST_LIMIT_DB", "DOT_THRESHOLD", "FrameVerdict", "FrameWish", "contrast_between", "threshold_for"]
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,11 +55,8 @@ class FrameWish:
 
     @property
     def threshold(self) -> float:
-        """From which amplitude on a dot is felt as raised.
-
-        Half of full scale; where less contrast is asked for, in the middle between a raised dot and a flat one.
-        """
-        return DOT_THRESHOLD if self.contrast_db is None else max(DOT_THRESHOLD, 10 ** (-self.contrast_db / 40))
+        """From which amplitude on a dot is felt as raised."""
+        return threshold_for(CONTRAST_LIMIT_DB if self.contrast_db is None else self.contrast_db)
 
     @property
     def raised(self) -> Mask:
@@ -133,9 +130,14 @@ class FrameVerdict:
         return np.broadcast_to(self.wish.clear(self.contrast_db), self.wrong.shape[:-2])
 
     @property
+    def right(self) -> Mask:
+        """Where no dot is wrong; bool, shape D."""
+        return np.asarray(~self.wrong.any(axis=(-2, -1)))
+
+    @property
     def ok(self) -> Mask:
         """Where the wish is felt; bool, shape D."""
-        return np.asarray(~self.wrong.any(axis=(-2, -1)) & self.clear)
+        return np.asarray(self.right & self.clear)
 
     @property
     def share(self) -> float:
@@ -148,6 +150,14 @@ class FrameVerdict:
         often = self.wrong.reshape(-1, *self.wrong.shape[-2:]).sum(axis=0)
         row, col = np.unravel_index(int(np.argmax(often)), often.shape)
         return (int(row), int(col)) if often[row, col] else None
+
+
+def threshold_for(contrast_db: float) -> float:
+    """From which amplitude on a dot is felt as raised, in units of full scale.
+
+    Half of it; where less than 12 dB are asked for, in the middle between a raised dot and a flat one.
+    """
+    return DOT_THRESHOLD if contrast_db >= CONTRAST_LIMIT_DB else 10 ** (-contrast_db / 40)
 
 
 def contrast_between(raised: Mask, flat: Mask, level: Floats) -> Floats | None:

@@ -38,6 +38,7 @@ def plan(
     tol: float | None = None,
     budget_s: float | None = None,
     contrast_db: float | None = None,
+    yield_: float | None = None,
 ) -> ScenePlan:
     """Find the settings that make a scene on a device.
 
@@ -57,6 +58,9 @@ def plan(
     contrast_db : float, optional
         Decibels by which unraised dots stay below raised ones, planned and judged. A job has its own. Without,
         vibrating chains are planned with 20, and 12 are enough.
+    yield_ : float, optional
+        Share of devices, drawn with the device's spread, that are to keep what is wished. The report says on how
+        many they do. A job has its own.
 
     Returns
     -------
@@ -77,14 +81,14 @@ def plan(
     >>> [frame.frame.text for frame in plan]
     ['Hello', 'world']
     """
-    request = Request(tol=tol, budget_s=budget_s, contrast_db=contrast_db)
+    request = Request(tol=tol, budget_s=budget_s, contrast_db=contrast_db, yield_=yield_)
     if isinstance(scene, DeviceScene):
         request = scene.request(request)
         device = scene.device if device is None else device
     if device is None:
         raise AppError("plan: no device was given; give the one that the scene was laid out for")
     profile = device_of(device)
-    found = plan_scene(scene, profile, contrast_db=request.contrast_db)
+    found = plan_scene(scene, profile, contrast_db=request.contrast_db, yield_=request.yield_)
     return ScenePlan(profile, _Judged(found, scene, request), scene.encoding, scene, request)
 
 
@@ -103,7 +107,7 @@ class ScenePlan(Plan, Sequence[FramePlan]):
     scene : encoders.Scene
         What should be felt.
     request : Request
-        Tolerance, budget and contrast.
+        Tolerance, budget, contrast and yield.
 
     Examples
     --------

@@ -36,6 +36,7 @@ from .command import (
     Tol,
     Written,
     Yes,
+    Yield,
     finish as _finish,
     say,
 )
@@ -96,6 +97,7 @@ def text(
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
+    share: Yield = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -122,8 +124,8 @@ def text(
     from .options import place_of, text_options
 
     request = request_of(
-        tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, encoding=sample_format.value,
-        actuator=place_of(actuator), yes=yes,
+        tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
+        encoding=sample_format.value, actuator=place_of(actuator), yes=yes,
     )  # fmt: skip
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,

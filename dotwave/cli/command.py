@@ -15,7 +15,7 @@ from ..reports.printable import Printable
 from .completion import completed_devices, completed_files
 
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "finish",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "Yield", "finish",
     "printable", "say",
 ]  # fmt: skip
 
@@ -48,6 +48,12 @@ Contrast = Annotated[
     float | None,
     typer.Option(
         min=6.0, max=60.0, help="Least decibels between raised and unraised dots; none: 20 planned, 12 enough."
+    ),
+]
+Yield = Annotated[
+    float | None,
+    typer.Option(
+        "--yield", min=0.0, max=1.0, help="Share of devices, drawn with the device's spread, that are to keep it."
     ),
 ]
 Actuator = Annotated[

@@ -49,6 +49,7 @@ class JobScene(DeviceScene):
             tol=given.tol or job.tol,
             budget_s=given.budget_s or (job.budget.planning_s if job.budget else None),
             contrast_db=given.contrast_db or job.contrast_db,
+            yield_=given.yield_ or job.yield_,
             encoding=job.sample_format,
         )
 

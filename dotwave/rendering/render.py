@@ -49,7 +49,7 @@ def render(scene: Scene, device: Device, out: Path | None = None, request: Reque
     """
     began = time.perf_counter()
     request = request or Request()
-    plan = plan_scene(scene, device, contrast_db=request.contrast_db)
+    plan = plan_scene(scene, device, contrast_db=request.contrast_db, yield_=request.yield_)
     if out is not None and FORMATS[check_suffix(out)].sample_bytes:
         go_on(extent_of(scene.frames, device, out, request.encoding), out, yes=request.yes)
     passage = _Passage(plan, Judge(request), writes=out is not None)
