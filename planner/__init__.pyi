@@ -87,6 +87,7 @@ from .robustness.spread import (
 )
 from .scene_plan import (
     DEFAULT_CONTRAST_DB as DEFAULT_CONTRAST_DB,
+    kept_share as kept_share,
     plan_scene as plan_scene,
 )
 from .surroundings import (

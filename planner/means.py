@@ -25,11 +25,13 @@ class Means:
         where nothing is aimed beside the wish.
     dots : what dots are aimed by; None: they are aimed at as they are wished.
     tried : all means that were tried, in order; empty where there was no choice.
+    share : of devices that keep the first frames of the scene; None where there was no choice.
     """
 
     memory: Memory
     dots: DotGoal | None = None
     tried: tuple[MeansTried, ...] = ()
+    share: float | None = None
 
     def change(self, before: list[ChainTarget], frame: Frame) -> Change:
         """The change from what chains hold to a frame.

@@ -23,7 +23,7 @@ from .wish import FrameWish
 if TYPE_CHECKING:
     from .robustness.expected import Expectation
 
-__all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
+__all__ = ["DEFAULT_CONTRAST_DB", "kept_share", "plan_scene"]
 
 DEFAULT_CONTRAST_DB = 20.0
 
@@ -65,6 +65,17 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float | None = None
     return Plan(device, _Frames(scene, device, contrast_db, yield_), scene.encoding)
 
 
+def kept_share(
+    scene: Scene, device: Device, *, contrast_db: float | None = None, yield_: float | None = None
+) -> float | None:
+    """The share of devices that keep the first pages of a scene, with the means that it would be planned with.
+
+    None where there is no choice of means. Arguments and errors are those of `plan_scene`.
+    """
+    frames = plan_scene(scene, device, contrast_db=contrast_db, yield_=yield_).frames
+    return frames.means.share if isinstance(frames, _Frames) else None
+
+
 class _Frames:
     """The planned frames of a scene, as often as they are asked for."""
 
@@ -82,7 +93,7 @@ class _Frames:
         return Expectation(self._device, WANTED if self._wanted is None else self._wanted)
 
     @cached_property
-    def _means(self) -> Means:
+    def means(self) -> Means:
         """Under spread those that the first frames ask for; found once."""
         found = None
         if self._expected is not None:
@@ -92,7 +103,7 @@ class _Frames:
         return found or Means(memory_of(self._device, self._planned_db))
 
     def __iter__(self) -> Iterator[FramePlan]:
-        means, memory = self._means, self._means.memory
+        means, memory = self.means, self.means.memory
         rate = self._device.amplifier.rate_hz
         targets = memory.at_rest
         position = 0
@@ -124,7 +135,7 @@ class _Frames:
             return whole
         wish = FrameWish.of(frame, self._asked_db)
         found = self._expected.of(change.targets, change.states, wish)
-        return replace(whole, spread=found and replace(found, tried=self._means.tried))
+        return replace(whole, spread=found and replace(found, tried=self.means.tried))
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
@@ -141,4 +152,4 @@ class _Frames:
             return state.outcome.sentence
         if state.lacking:
             return f"{self._device.name} cannot make this pattern: {state.lacking}."
-        return self._means.memory.planner.family(AmplitudeTarget).note()
+        return self.means.memory.planner.family(AmplitudeTarget).note()

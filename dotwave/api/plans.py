@@ -15,6 +15,7 @@ from encoders import Scene
 from planner import FramePlan, Plan, plan_scene
 
 from ..errors import AppError, NotMade
+from ..rendering.presenting import presented
 from ..rendering.render import render
 from ..reports.html import html_table
 from ..reports.report import Report
@@ -60,7 +61,8 @@ def plan(
         vibrating chains are planned with 20, and 12 are enough.
     yield_ : float, optional
         Share of devices, drawn with the device's spread, that are to keep what is wished. The report says on how
-        many they do. A job has its own.
+        many they do. A job has its own. The means for it are sought at once; a text without a presentation of its own
+        may be shown by row or by dot for it.
 
     Returns
     -------
@@ -88,6 +90,7 @@ def plan(
     if device is None:
         raise AppError("plan: no device was given; give the one that the scene was laid out for")
     profile = device_of(device)
+    scene = presented(scene, profile, request).scene
     found = plan_scene(scene, profile, contrast_db=request.contrast_db, yield_=request.yield_)
     return ScenePlan(profile, _Judged(found, scene, request), scene.encoding, scene, request)
 

@@ -21,8 +21,8 @@ from .expected import Expectation
 
 __all__ = ["means_for"]
 
-# Frames of a scene that means are chosen by: its first ones that differ.
-LOOKED = 8
+# Means are chosen by the first pages of a scene, and of frames that are on one page by no more than so many.
+PAGES, LOOKED = 6, 36
 # How strong raised dots may be aimed at, in units of full scale, and how many decibels steeper a step up from one
 # actuator to the next may be than the contrast that is planned with: the ways in take more volts then.
 AIMS = ((2.0, 0.0), (2.0, 2.0), (2.0, 4.0), (4.0, 2.0))
@@ -91,15 +91,15 @@ def means_for(
     if max(shares) <= SAME:
         shares = [one.each for one in tried]
     best = next(one for one, share in zip(tried, shares, strict=True) if share > max(shares) - SAME)
-    return Means(best.means.memory, best.means.dots, tuple(one.told for one in tried))
+    return Means(best.means.memory, best.means.dots, tuple(one.told for one in tried), best.share)
 
 
 def _first(frames: Iterable[Frame]) -> list[Frame]:
     found: dict[bytes, Frame] = {}
     for frame in frames:
-        found.setdefault(frame.pattern.amplitude.tobytes(), frame)
-        if len(found) == LOOKED:
+        if frame.page >= PAGES or len(found) == LOOKED:
             break
+        found.setdefault(frame.pattern.amplitude.tobytes(), frame)
     return list(found.values())
 
 

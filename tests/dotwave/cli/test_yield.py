@@ -96,3 +96,20 @@ def test_the_python_api_asks_for_a_yield(device: Path) -> None:
     assert not report.ok
     assert report.made
     assert isinstance(report.beside["yield"], YieldReport)
+
+
+def test_a_text_may_be_shown_in_parts_for_a_yield(dotwave: Call, device: Path) -> None:
+    """At 2 % fewer devices keep all dots of a page together than by row or by dot."""
+    profile = json.loads(device.read_text(encoding="utf-8")) | {"spread": {"frequency": 0.02}}
+    device.write_text(json.dumps(profile), encoding="utf-8")
+    free, kept = (
+        json.loads(dotwave("text", "Hello", "-d", device, "--yield", "0.95", "--json", *asked).out)
+        for asked in ((), ("--presentation", "together"))
+    )
+    assert free["yield"]["share"] > kept["yield"]["share"] + 0.1
+    assert free["frames"] > kept["frames"]
+    said = next(note for note in free["notes"] if note.startswith("Shown by-"))
+    assert re.fullmatch(r"Shown by-(row|dot); devices that keep the first pages: together \S+ %, by-row .*", said)
+    assert not any(note.startswith("Shown") for note in kept["notes"])
+    # Nobody is surprised by another presentation who asks for no yield.
+    assert json.loads(dotwave("text", "Hello", "-d", device, "--json").out)["frames"] == kept["frames"]
