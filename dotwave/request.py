@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from drivers import Encoding
-from planner import DEFAULT_CONTRAST_DB
 
 from .errors import AppError
 
@@ -42,7 +41,8 @@ class Request:
     budget_s : seconds for planning.
     explain : list what the scene requires.
     pareto : list what a frame can be bought for.
-    contrast_db : how far unraised dots of a vibrating chain stay below raised ones.
+    contrast_db : how far unraised dots stay below raised ones, planned and judged.
+    yield_ : share of devices, drawn with the device's spread, that are to keep what is wished.
     encoding : number format of samples.
     actuator : (row, col) that a haptic file of one actuator shows; None is the mean over the grid.
     yes : do not ask before a very large file.
@@ -52,7 +52,8 @@ class Request:
     budget_s: float | None = None
     explain: bool = False
     pareto: FrameRequest | None = None
-    contrast_db: float = DEFAULT_CONTRAST_DB
+    contrast_db: float | None = None
+    yield_: float | None = None
     encoding: Encoding = "float32"
     actuator: tuple[int, int] | None = None
     yes: bool = False

@@ -17,7 +17,7 @@ from drivers import FrameMark, Manifest, Role, read_waveform
 from encoders import FeltPage, back_check, covered_text, read_cells
 
 from .progress import progress
-from .reports.text import AMPLITUDE_ERROR_LIMIT, DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
+from .reports.text import FrameCheck, VerifyReport
 
 __all__ = ["verify"]
 
@@ -26,14 +26,12 @@ Complexes = NDArray[np.complex128]
 
 # Forces, links and positions of a block stay near 8 MB each, whatever the grid.
 BLOCK_VALUES = 1 << 20
-# A target between these is a level, neither a raised dot nor a flat one.
-GRADED = (0.3, 0.9)
 
 
 class _Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
-    `level` is what is compared with the target: the mean of a bias pattern, else the amplitude at the
+    `level` is what is compared with wish and target: the mean of a bias pattern, else the amplitude at the
     drive's frequency, or the sum of those at all its tones. `still` and `moving` are both of them. `error` is the
     deviation from the target: of the complex amplitude where phases are wanted, of the worst tone where there are
     several.
@@ -187,11 +185,7 @@ def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
 
 
 def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
-    wanted, present = mark.target >= DOT_THRESHOLD, felt.level >= DOT_THRESHOLD
-    # A level wanted at the threshold itself may be felt on either side of it.
-    near = np.abs(felt.level - mark.target) <= AMPLITUDE_ERROR_LIMIT
-    # Between levels there is no such thing as the contrast of dots; the amplitudes are held to all the same.
-    graded = bool(np.any((mark.target > GRADED[0]) & (mark.target < GRADED[1])))
+    verdict = mark.wish.verdict(felt.level)
     return FrameCheck(
         page=mark.page,
         start_s=mark.start_s,
@@ -199,9 +193,10 @@ def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
         end_s=mark.end_s,
         outcome=str(mark.outcome),
         target=mark.target,
+        wish=mark.wish,
         felt=felt.level,
-        wrong_dots=int(np.count_nonzero(((wanted != present) & ~near) | np.isnan(felt.level))),
-        contrast_db=None if graded else contrast_between(wanted, felt.level),
+        wrong_dots=int(verdict.wrong_dots),
+        contrast_db=None if verdict.contrast_db is None else float(verdict.contrast_db),
         amplitude_error=float(np.max(felt.error)),
         wanted_cells=mark.cells,
         text=mark.text,

@@ -39,6 +39,7 @@ from .errors import (
     DwellTooShort as DwellTooShort,
     PlanError as PlanError,
     SceneDoesNotFit as SceneDoesNotFit,
+    YieldError as YieldError,
 )
 from .identification.calibration import (
     ChainFit as ChainFit,
@@ -56,7 +57,10 @@ from .operating_point import (
 )
 from .outlook import (
     FrameSpread as FrameSpread,
+    MeansTried as MeansTried,
     TradePoint as TradePoint,
+    needed_for as needed_for,
+    spread_words as spread_words,
 )
 from .plan import (
     FramePlan as FramePlan,
@@ -83,6 +87,7 @@ from .robustness.spread import (
 )
 from .scene_plan import (
     DEFAULT_CONTRAST_DB as DEFAULT_CONTRAST_DB,
+    kept_share as kept_share,
     plan_scene as plan_scene,
 )
 from .surroundings import (
@@ -92,4 +97,10 @@ from .surroundings import (
 )
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
+)
+from .wish import (
+    CONTRAST_LIMIT_DB as CONTRAST_LIMIT_DB,
+    DOT_THRESHOLD as DOT_THRESHOLD,
+    FrameVerdict as FrameVerdict,
+    FrameWish as FrameWish,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit"]
+__all__ = ["ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit", "YieldError"]
 
 
 class PlanError(Exception):
@@ -39,4 +39,11 @@ class ContrastError(PlanError, ValueError):
     """A contrast between raised and unraised dots that is none.
 
     Example: ``--contrast 0``.
+    """
+
+
+class YieldError(PlanError, ValueError):
+    """A share of devices that is none, or that nothing is known about.
+
+    Example: ``--yield 0.9`` on a device without a spread.
     """

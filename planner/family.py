@@ -87,7 +87,8 @@ class AmplitudeFamily(PatternFamily):
 
     def held(self, target: ChainTarget, started: bool) -> ChainTarget:
         """The amplitudes that `levels` gives."""
-        return AmplitudeTarget.of(self.levels(target.levels, started))
+        dots = target.dots if isinstance(target, AmplitudeTarget) else None
+        return AmplitudeTarget.of(self.levels(target.levels, started), dots=dots)
 
     def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
         """All of them in one array."""

@@ -25,6 +25,12 @@ class Change:
     states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
 
+    @property
+    def made(self) -> bool:
+        """Whether every chain can hold what it is to hold, and get there."""
+        held = all(state.outcome is Outcome.OK for state in self.states)
+        return held and not any(ramp is not None and ramp.lacking for ramp in self.ramps)
+
 
 def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> Change:
     """The change from what chains hold to what they are to hold."""

@@ -14,7 +14,7 @@ from .cache import PlanCache
 from .operating_point import OperatingPoint
 from .plan import Ramp
 from .planner import Planner, Transition
-from .targets import AmplitudeTarget, ChainTarget, targets_of
+from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 from .transitions.joining import turned_ramp, turned_state
 
 __all__ = ["Memory"]
@@ -52,9 +52,11 @@ class Memory:
         """All chains of the device at rest."""
         return [self.rest] * (self.device.rows * self.device.chains_per_row)
 
-    def hold(self, pattern: TargetPattern, before: Sequence[ChainTarget]) -> list[ChainTarget]:
-        """What chains hold for a pattern, given what they held."""
-        targets = list(map(self.held, targets_of(pattern, self.device), before))
+    def hold(
+        self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None
+    ) -> list[ChainTarget]:
+        """What chains hold for a pattern, given what they held; `dots` as in `targets_of`."""
+        targets = list(map(self.held, targets_of(pattern, self.device, dots), before))
         self.prepare(targets)
         return targets
 

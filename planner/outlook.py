@@ -2,13 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-__all__ = ["FrameSpread", "TradePoint"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FACTORS", "FrameSpread", "MeansTried", "TradePoint", "needed_for", "spread_words"]
 
 NAMES = ("frequency", "damping", "beta", "lam")
+FACTORS = 2.0 ** -np.arange(0.0, 8.0, 0.5)
+"""Parts of the spread that are tried for the accuracy that is needed."""
+
+
+def needed_for(devices: NDArray[np.bool_], wanted: float) -> float:
+    """The part of the spread under which a share `wanted` of devices is right, between the parts that were tried.
+
+    Parameters
+    ----------
+    devices : bool, shape (parts, draws), which devices are right under each of `FACTORS`.
+    wanted : 0 to 1.
+
+    Returns
+    -------
+    float, 1 where the spread is good enough, 0 where no part of it that was tried is.
+    """
+    shares = devices.mean(axis=1)
+    reached = np.flatnonzero(shares >= wanted)
+    if not len(reached) or reached[0] == 0:
+        return 1.0 if len(reached) else 0.0
+    good = int(reached[0])
+    part = (wanted - shares[good - 1]) / (shares[good] - shares[good - 1])
+    return float(FACTORS[good - 1] * (FACTORS[good] / FACTORS[good - 1]) ** part)
+
+
+def spread_words(spread: Sequence[float], factor: float) -> str:
+    """A part of a spread in words: ``frequency 1 %, lam 2 %``."""
+    known = zip(NAMES, spread, strict=True)
+    return ", ".join(f"{name} {100 * value * factor:.2g} %" for name, value in known if value) or "nothing"
+
+
+@dataclass(frozen=True)
+class MeansTried:
+    """Means that a scene was tried with.
+
+    Attributes
+    ----------
+    omega : frequency over f0.
+    loudest : how strong raised dots may be aimed at, in units of full scale;
+    steepest_db : decibels that a step up from one actuator to the next may have. 1 and None: all dots are aimed at as
+        they are wished.
+    share : of devices that keep the first frames; 0 where one of them cannot be made.
+    """
+
+    omega: float
+    loudest: float
+    steepest_db: float | None
+    share: float
+
+    def __str__(self) -> str:
+        aims = "dots as wished"
+        if self.steepest_db is not None:
+            aims = f"raised dots up to {self.loudest:g} of full scale, steps up to {self.steepest_db:g} dB"
+        return f"omega {self.omega:.3f}, {aims}: {100 * self.share:.1f} %"
 
 
 @dataclass(frozen=True)
@@ -51,12 +108,17 @@ class FrameSpread:
     ----------
     spread : relative standard deviations of frequency, damping, beta and lam.
     expected, median, quantile_90 : of the worst actuator's error.
-    yield_ : share of draws with every actuator within `tolerance` and on its side of the dot threshold.
+    yield_ : share of draws on which the wish is felt: of dots, none wrong and the contrast kept; of levels and waves,
+        every actuator within `tolerance` and on its side of the dot threshold.
     dots_right : share of draws with every actuator on its side of the threshold.
     draws : how many there were.
     needed : what the spread must be multiplied by so that a plan for it has a yield of `wanted`; 1 where it is good
         enough, 0 where no accuracy tried is.
-    aim : how far the plan itself aims beside the wish, so that the expected error is least.
+    devices : bool, shape (parts, draws), read-only, on which draws it is, under each of `FACTORS`.
+    least_db : of dots, the contrast that is to be kept; None where there is none, or the frame is judged as levels.
+    aim : how far the plan itself aims beside the wish, for the yield of dots or the expected error of levels.
+    held : of dots, what the frame is made with; empty else.
+    tried : means that the scene was tried with, where there was a choice.
     worst : the worst chain as planned;
     trade : the same held by the closed form, at ever higher frequencies. None and empty where no closed form makes its
         pattern.
@@ -72,19 +134,22 @@ class FrameSpread:
     wanted: float
     draws: int
     needed: float
+    devices: NDArray[np.bool_] = field(repr=False, compare=False)
+    least_db: float | None = None
     aim: float = 0.0
+    held: str = ""
+    tried: tuple[MeansTried, ...] = ()
     worst: TradePoint | None = None
     trade: tuple[TradePoint, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, as in a manifest."""
-        plain = {
-            name: value for name, value in vars(self).items() if name not in ("yield_", "worst", "trade", "spread")
-        }
+        apart = ("yield_", "worst", "trade", "spread", "devices", "tried")
+        plain = {name: value for name, value in vars(self).items() if name not in apart}
         return {
             "spread": dict(zip(NAMES, self.spread, strict=True)), "yield": self.yield_, **plain,
             "worst": None if self.worst is None else self.worst.as_dict(),
-            "trade": [point.as_dict() for point in self.trade],
+            "trade": [point.as_dict() for point in self.trade], "tried": [asdict(means) for means in self.tried],
         }  # fmt: skip
 
     def lines(self) -> Iterator[str]:
@@ -94,11 +159,19 @@ class FrameSpread:
             f"- error expected {100 * self.expected:.3g} % of full scale, median {100 * self.median:.3g} %, "
             f"90 % of draws below {100 * self.quantile_90:.3g} %"
         )
-        yield (
-            f"- yield {100 * self.yield_:.1f} % within {100 * self.tolerance:g} %; "
-            f"dots right in {100 * self.dots_right:.1f} %"
-        )
-        if self.aim > 0:
+        if self.held:
+            contrast = "" if self.least_db is None else f" and a contrast of {self.least_db:g} dB"
+            right = f"dots right in {100 * self.dots_right:.1f} %"
+            yield f"- yield {100 * self.yield_:.1f} % with no wrong dot{contrast}; {right}"
+            yield f"- made with {self.held}"
+        else:
+            yield (
+                f"- yield {100 * self.yield_:.1f} % within {100 * self.tolerance:g} %; "
+                f"dots right in {100 * self.dots_right:.1f} %"
+            )
+        if len(self.tried) > 1:
+            yield "- tried, with the share of devices that keep the first frames: " + "; ".join(map(str, self.tried))
+        if self.aim > 0 and not self.held:
             yield f"- it aims up to {100 * self.aim:.3g} % beside the wish, where the expected error is least"
         if self.needed >= 1:
             yield f"- good enough for a yield of {100 * self.wanted:g} %"
@@ -112,5 +185,4 @@ class FrameSpread:
             yield f"- planned, {self.worst}"
 
     def _words(self, factor: float) -> str:
-        known = zip(NAMES, self.spread, strict=True)
-        return ", ".join(f"{name} {100 * value * factor:.2g} %" for name, value in known if value) or "nothing"
+        return spread_words(self.spread, factor)

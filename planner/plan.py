@@ -13,6 +13,7 @@ from chainsim import Device, Outcome
 from encoders import Frame
 
 from .operating_point import OperatingPoint
+from .wish import FrameWish
 
 if TYPE_CHECKING:
     from .outlook import FrameSpread
@@ -80,7 +81,7 @@ class FramePlan:
     `states` and `ramps` go row by row, chain by chain (rows * chains_per_row of them); a ramp of None
     means the chain already stands. `frame` is None for the way out after the last frame.
     `note` is one sentence when the outcome is not ok. `spread` is what the frame becomes under the device's spread,
-    where it has one and the frame can be made.
+    where it has one and the frame can be made. `contrast_db` is what was asked for, None where nothing was.
 
     Examples
     --------
@@ -105,10 +106,16 @@ class FramePlan:
     outcome: Outcome = Outcome.OK
     note: str = ""
     spread: FrameSpread | None = None
+    contrast_db: float | None = None
 
     def __repr__(self) -> str:
         times = f"{self.start_s:.3f} to {self.end_s:.3f} s, settled at {self.settled_s:.3f} s"
         return f"FramePlan({times}, {self.outcome})"
+
+    @property
+    def wish(self) -> FrameWish | None:
+        """What the scene asks for, whatever the states aim at; None for the way out."""
+        return None if self.frame is None else FrameWish.of(self.frame, self.contrast_db)
 
     @property
     def error(self) -> float:

@@ -5,32 +5,38 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from chainsim import Device, Outcome
 from encoders import Frame, Scene
 
-from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
+from .errors import ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
 from .frame_change import Change, change_to
-from .memory import Memory
+from .means import Means
 from .operating_point import OperatingPoint
 from .plan import FramePlan, Plan
 from .targets import AmplitudeTarget
+from .unequal import memory_of
+from .wish import FrameWish
 
 if TYPE_CHECKING:
     from .robustness.expected import Expectation
 
-__all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
+__all__ = ["DEFAULT_CONTRAST_DB", "kept_share", "plan_scene"]
 
 DEFAULT_CONTRAST_DB = 20.0
 
 
-def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CONTRAST_DB) -> Plan:
+def plan_scene(scene: Scene, device: Device, *, contrast_db: float | None = None, yield_: float | None = None) -> Plan:
     """Plan `scene` on `device`; the work is done as `Plan.frames` is read.
 
     Parameters
     ----------
-    contrast_db : how far an unraised dot of a vibrating chain stays below a raised one.
+    contrast_db : asked between raised and unraised dots, which is planned and judged. None: planned with
+        `DEFAULT_CONTRAST_DB` where chains vibrate, and judged as `FrameWish` says.
+    yield_ : share of devices, drawn with the device's spread, that are to keep the wish. Where there is a choice the
+        search for means ends at it; None: at 0.9.
 
     Raises
     ------
@@ -38,46 +44,71 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float = DEFAULT_CON
         When the scene was laid out for another grid.
     ContrastError
         When the contrast is not above 0.
+    YieldError
+        When the yield is not above 0 and at most 1, or the device has no spread.
     """
-    if not (math.isfinite(contrast_db) and contrast_db > 0):
+    if contrast_db is not None and not (math.isfinite(contrast_db) and contrast_db > 0):
         raise ContrastError(f"contrast: expected a number of decibels above 0, got {contrast_db:g}; 20 is usual")
+    if yield_ is not None and not 0 < yield_ <= 1:
+        raise YieldError(f"yield: expected a share above 0 and at most 1 such as 0.9, got {yield_:g}")
+    if yield_ is not None and device.spread is None:
+        raise YieldError(
+            f"yield: {device.name} says nothing of how its actuators differ; give it a spread, such as "
+            "spread: {frequency: 0.01} in the device"
+        )
     shape = (scene.shape.rows, scene.shape.cols)
     if shape != (device.rows, device.cols):
         raise SceneDoesNotFit(
             f"the scene is laid out for {shape[0]} x {shape[1]} actuators, "
             f"{device.name} has {device.rows} x {device.cols}"
         )
-    return Plan(device, _Frames(scene, device, contrast_db), scene.encoding)
+    return Plan(device, _Frames(scene, device, contrast_db, yield_), scene.encoding)
 
 
-def _memory_of(device: Device, contrast_db: float) -> Memory:
-    if not device.actuators:
-        return Memory(device, contrast_db)
-    from .unequal import UnequalMemory
+def kept_share(
+    scene: Scene, device: Device, *, contrast_db: float | None = None, yield_: float | None = None
+) -> float | None:
+    """The share of devices that keep the first pages of a scene, with the means that it would be planned with.
 
-    return UnequalMemory(device, contrast_db)
+    None where there is no choice of means. Arguments and errors are those of `plan_scene`.
+    """
+    frames = plan_scene(scene, device, contrast_db=contrast_db, yield_=yield_).frames
+    return frames.means.share if isinstance(frames, _Frames) else None
 
 
 class _Frames:
     """The planned frames of a scene, as often as they are asked for."""
 
-    def __init__(self, scene: Scene, device: Device, contrast_db: float) -> None:
-        self._scene = scene
-        self._memory = _memory_of(device, contrast_db)
-        self._device = device
-        self._expected: Expectation | None = None
-        if device.spread is not None:
-            from .robustness.expected import Expectation
+    def __init__(self, scene: Scene, device: Device, asked_db: float | None, wanted: float | None) -> None:
+        self._scene, self._device = scene, device
+        self._asked_db, self._wanted = asked_db, wanted
+        self._planned_db = DEFAULT_CONTRAST_DB if asked_db is None else asked_db
 
-            self._expected = Expectation(device)
+    @cached_property
+    def _expected(self) -> Expectation | None:
+        if self._device.spread is None:
+            return None
+        from .robustness.expected import WANTED, Expectation
+
+        return Expectation(self._device, WANTED if self._wanted is None else self._wanted)
+
+    @cached_property
+    def means(self) -> Means:
+        """Under spread those that the first frames ask for; found once."""
+        found = None
+        if self._expected is not None:
+            from .robustness.means_search import means_for
+
+            found = means_for(self._scene.frames, self._expected, self._planned_db, self._asked_db)
+        return found or Means(memory_of(self._device, self._planned_db))
 
     def __iter__(self) -> Iterator[FramePlan]:
-        device, memory = self._device, self._memory
-        rate = device.amplifier.rate_hz
+        means, memory = self.means, self.means.memory
+        rate = self._device.amplifier.rate_hz
         targets = memory.at_rest
         position = 0
         for frame in self._scene.frames:
-            change = change_to(memory, targets, memory.hold(frame.pattern, targets))
+            change = means.change(targets, frame)
             # What cannot be held is not played, and the next frame begins at rest.
             played = all(state.outcome is Outcome.OK for state in change.states)
             targets = change.targets if played else memory.at_rest
@@ -98,10 +129,13 @@ class _Frames:
                 f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
-        whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
+        times = start_s, start_s + longest, end_s
+        whole = self._judged(FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db))
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
-        return replace(whole, spread=self._expected.of(change.targets, change.states))
+        wish = FrameWish.of(frame, self._asked_db)
+        found = self._expected.of(change.targets, change.states, wish)
+        return replace(whole, spread=found and replace(found, tried=self.means.tried))
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
@@ -118,4 +152,4 @@ class _Frames:
             return state.outcome.sentence
         if state.lacking:
             return f"{self._device.name} cannot make this pattern: {state.lacking}."
-        return self._memory.planner.family(AmplitudeTarget).note()
+        return self.means.memory.planner.family(AmplitudeTarget).note()

@@ -13,13 +13,39 @@ from numpy.typing import NDArray
 from chainsim import Device
 from encoders import TargetPattern
 
-__all__ = ["AmplitudeTarget", "ChainTarget", "WalkingTarget", "WaveTarget", "targets_of"]
+from .wish import threshold_for
+
+__all__ = ["AS_WISHED", "AmplitudeTarget", "ChainTarget", "DotGoal", "WalkingTarget", "WaveTarget", "targets_of"]
 
 Floats = NDArray[np.float64]
 
 # Phases are told apart to so many decimals, so that rows of a plane wave are the same but for a turn.
 PHASE_DECIMALS = 9
 AMPLITUDE_DECIMALS = 12
+
+
+AS_WISHED = 1.0
+
+
+@dataclass(frozen=True)
+class DotGoal:
+    """What raised and flat dots are to keep on devices whose actuators differ.
+
+    Attributes
+    ----------
+    contrast_db : least decibels between the weakest raised and the strongest flat dot.
+    loudest : how strong a raised dot may be aimed at, in units of full scale; `AS_WISHED`: dots are not aimed beside.
+    steepest : largest step up from one actuator to the next, a factor: of steeper ones no way in is quick enough.
+    """
+
+    contrast_db: float
+    loudest: float
+    steepest: float
+
+    @property
+    def threshold(self) -> float:
+        """From which amplitude on a dot is raised, in units of full scale."""
+        return threshold_for(self.contrast_db)
 
 
 @dataclass(frozen=True)
@@ -74,14 +100,26 @@ class ChainTarget:
 
 @dataclass(frozen=True)
 class AmplitudeTarget(ChainTarget):
-    """Amplitudes, or deflections; any phases will do. All zero is rest."""
+    """Amplitudes, or deflections; any phases will do. All zero is rest.
+
+    Attributes
+    ----------
+    dots : they are raised and flat dots, which is all that they are to keep under spread; None: they are levels.
+    """
+
+    dots: DotGoal | None = field(default=None, kw_only=True, repr=False)
 
     __hash__ = ChainTarget.__hash__
 
     @classmethod
-    def of(cls, levels: Floats, turn: float = 0.0) -> AmplitudeTarget:
-        """Of amplitudes in an array of shape (n,)."""
-        return cls(tuple(levels.tolist()), turn=turn)
+    def of(cls, levels: Floats, turn: float = 0.0, dots: DotGoal | None = None) -> AmplitudeTarget:
+        """Of amplitudes in an array of shape (n,); rest is rest, whatever it is for."""
+        return cls(tuple(levels.tolist()), turn=turn, dots=dots if np.any(levels) else None)
+
+    @property
+    def key(self) -> bytes:
+        """The target in bytes, for a cache on disk."""
+        return super().key + (b"" if self.dots is None else repr(self.dots).encode())
 
 
 @dataclass(frozen=True)
@@ -169,8 +207,8 @@ def _array(numbers: tuple[float, ...]) -> Floats:
     return array
 
 
-def targets_of(pattern: TargetPattern, device: Device) -> Iterator[ChainTarget]:
-    """What a pattern wants of every chain of `device`, row by row."""
+def targets_of(pattern: TargetPattern, device: Device, dots: DotGoal | None = None) -> Iterator[ChainTarget]:
+    """What a pattern wants of every chain of `device`, row by row; `dots` where its amplitudes are dots."""
     n = device.chain_length
     size, angle = np.abs(pattern.amplitude), np.angle(pattern.amplitude)
     weight = np.ones(size.shape) if pattern.weight is None else np.asarray(pattern.weight, dtype=np.float64)
@@ -180,7 +218,7 @@ def targets_of(pattern: TargetPattern, device: Device) -> Iterator[ChainTarget]:
     sizes, phases, weights = (part.reshape(-1, n) for part in (size, np.where(matters, angle, np.nan), weight))
     if pattern.walking is None and not matters.any():
         heeded = sizes if np.all(weights > 0) else sizes * (weights > 0)
-        yield from (AmplitudeTarget(tuple(levels)) for levels in heeded.tolist())
+        yield from (AmplitudeTarget.of(levels, dots=dots) for levels in heeded)
         return
     for number, (levels, phase, heed) in enumerate(zip(sizes, phases, weights, strict=True)):
         if pattern.walking is not None and np.any(levels):

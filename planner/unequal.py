@@ -14,9 +14,9 @@ from encoders import TargetPattern
 from .memory import MOST_STATES, Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
-from .targets import ChainTarget, targets_of
+from .targets import ChainTarget, DotGoal, targets_of
 
-__all__ = ["UnequalMemory"]
+__all__ = ["UnequalMemory", "memory_of"]
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +24,11 @@ Floats = NDArray[np.float64]
 SLACK = 1e-9
 # Largest change of a wave's motion, relative to its largest amplitude, by links that differ under one lam.
 TOLD = 5e-4
+
+
+def memory_of(device: Device, contrast_db: float) -> Memory:
+    """What is in front of a planner for a device: one for all of its chains, or for each kind of them."""
+    return UnequalMemory(device, contrast_db) if device.actuators else Memory(device, contrast_db)
 
 
 class UnequalMemory(Memory):
@@ -48,9 +53,11 @@ class UnequalMemory(Memory):
         self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
         self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
 
-    def hold(self, pattern: TargetPattern, before: Sequence[ChainTarget]) -> list[ChainTarget]:
-        """What chains hold for a pattern, given what they held."""
-        wanted = zip(self._kind_at, targets_of(pattern, self.device), before, strict=True)
+    def hold(
+        self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None
+    ) -> list[ChainTarget]:
+        """What chains hold for a pattern, given what they held; `dots` as in `targets_of`."""
+        wanted = zip(self._kind_at, targets_of(pattern, self.device, dots), before, strict=True)
         targets = [self._of_kind[kind].held(target, one) for kind, target, one in wanted]
         for kind, memory in enumerate(self._of_kind):
             memory.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)

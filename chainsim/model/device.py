@@ -128,7 +128,7 @@ class Device(_Part):
     bias : whether every actuator has its own DC bias channel.
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
-        lam: 0.0}`` (relative standard deviations). Plans then minimise the expected error. None: they are as they say.
+        lam: 0.0}`` (relative standard deviations). Plans are then made for many such devices. None: they are as they say.
     notes : field name -> where the value comes from.
 
     Examples

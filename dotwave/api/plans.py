@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, overload
 from chainsim import Outcome
 from drivers import Encoding, Waveform, channels_of
 from encoders import Scene
-from planner import DEFAULT_CONTRAST_DB, FramePlan, Plan, plan_scene
+from planner import FramePlan, Plan, plan_scene
 
 from ..errors import AppError, NotMade
+from ..rendering.presenting import presented
 from ..rendering.render import render
 from ..reports.html import html_table
 from ..reports.report import Report
@@ -37,7 +38,8 @@ def plan(
     *,
     tol: float | None = None,
     budget_s: float | None = None,
-    contrast_db: float = DEFAULT_CONTRAST_DB,
+    contrast_db: float | None = None,
+    yield_: float | None = None,
 ) -> ScenePlan:
     """Find the settings that make a scene on a device.
 
@@ -54,8 +56,13 @@ def plan(
         has its own.
     budget_s : float, optional
         Seconds for planning; later frames are ``out_of_budget``.
-    contrast_db : float
-        Decibels by which unraised dots of vibrating chains stay below raised ones. A job has its own.
+    contrast_db : float, optional
+        Decibels by which unraised dots stay below raised ones, planned and judged. A job has its own. Without,
+        vibrating chains are planned with 20, and 12 are enough.
+    yield_ : float, optional
+        Share of devices, drawn with the device's spread, that are to keep what is wished. The report says on how
+        many they do. A job has its own. The means for it are sought at once; a text without a presentation of its own
+        may be shown by row or by dot for it.
 
     Returns
     -------
@@ -76,14 +83,15 @@ def plan(
     >>> [frame.frame.text for frame in plan]
     ['Hello', 'world']
     """
-    request = Request(tol=tol, budget_s=budget_s, contrast_db=contrast_db)
+    request = Request(tol=tol, budget_s=budget_s, contrast_db=contrast_db, yield_=yield_)
     if isinstance(scene, DeviceScene):
         request = scene.request(request)
         device = scene.device if device is None else device
     if device is None:
         raise AppError("plan: no device was given; give the one that the scene was laid out for")
     profile = device_of(device)
-    found = plan_scene(scene, profile, contrast_db=request.contrast_db)
+    scene = presented(scene, profile, request).scene
+    found = plan_scene(scene, profile, contrast_db=request.contrast_db, yield_=request.yield_)
     return ScenePlan(profile, _Judged(found, scene, request), scene.encoding, scene, request)
 
 
@@ -102,7 +110,7 @@ class ScenePlan(Plan, Sequence[FramePlan]):
     scene : encoders.Scene
         What should be felt.
     request : Request
-        Tolerance, budget and contrast.
+        Tolerance, budget, contrast and yield.
 
     Examples
     --------

@@ -25,7 +25,21 @@ from typer.models import CommandInfo
 from encoders import Grade, Presentation, Undefined
 
 from ..errors import Terminated
-from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Written, Yes, finish as _finish, say
+from .command import (
+    Actuator,
+    Budget,
+    Contrast,
+    Device,
+    Explain,
+    Json,
+    Pareto,
+    Tol,
+    Written,
+    Yes,
+    Yield,
+    finish as _finish,
+    say,
+)
 from .completion import completed_devices, completed_files, completed_texts
 from .ending import ended
 from .help import LOOK, RENDER, SET_UP, STUDY, Commands
@@ -82,9 +96,8 @@ def text(
     ] = None,
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
-    contrast: Annotated[
-        float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
-    ] = 20.0,
+    contrast: Contrast = None,
+    share: Yield = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -111,8 +124,8 @@ def text(
     from .options import place_of, text_options
 
     request = request_of(
-        tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, encoding=sample_format.value,
-        actuator=place_of(actuator), yes=yes,
+        tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
+        encoding=sample_format.value, actuator=place_of(actuator), yes=yes,
     )  # fmt: skip
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,

@@ -15,7 +15,8 @@ from ..reports.printable import Printable
 from .completion import completed_devices, completed_files
 
 __all__ = [
-    "Actuator", "Budget", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "finish", "printable", "say",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "Yield", "finish",
+    "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -42,6 +43,18 @@ Tol = Annotated[
 ]
 Budget = Annotated[
     str | None, typer.Option(help="Time for planning, such as 50ms or 2s; says how exact the answer is.")
+]
+Contrast = Annotated[
+    float | None,
+    typer.Option(
+        min=6.0, max=60.0, help="Least decibels between raised and unraised dots; none: 20 planned, 12 enough."
+    ),
+]
+Yield = Annotated[
+    float | None,
+    typer.Option(
+        "--yield", min=0.0, max=1.0, help="Share of devices, drawn with the device's spread, that are to keep it."
+    ),
 ]
 Actuator = Annotated[
     str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")

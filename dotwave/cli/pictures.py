@@ -11,7 +11,7 @@ import typer
 
 from encoders import picture_rules
 
-from .command import Actuator, Budget, Device, Explain, Json, Pareto, Tol, Yes, finish, say
+from .command import Actuator, Budget, Contrast, Device, Explain, Json, Pareto, Tol, Yes, Yield, finish, say
 from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
@@ -28,9 +28,6 @@ def _words(option: str) -> str:
 
 PICTURES = (".bmp", ".gif", ".jpeg", ".jpg", ".png", ".svg", ".svgz", ".tif", ".tiff", ".webp")
 ARCHIVES = (".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz")
-Contrast = Annotated[
-    float, typer.Option(min=6.0, max=60.0, help="Decibels between raised and unraised dots of vibrating chains.")
-]
 
 
 @commands.command(short_help="Render pictures as patterns that can be felt.", rich_help_panel=RENDER)
@@ -58,7 +55,8 @@ def image(
     edges: Annotated[bool, typer.Option("--edges", help="Outlines in place of areas.")] = False,
     zoom: Annotated[int, typer.Option(help="From 2 on: an overview, then parts of the picture.")] = 1,
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
-    contrast: Contrast = 20.0,
+    contrast: Contrast = None,
+    share: Yield = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -80,8 +78,9 @@ def image(
     from .options import picture_options, place_of
 
     request = request_of(
-        tol=tol, budget=budget, contrast_db=contrast, encoding=sample_format.value, actuator=place_of(actuator), yes=yes
-    )
+        tol=tol, budget=budget, contrast_db=contrast, yield_=share, encoding=sample_format.value,
+        actuator=place_of(actuator), yes=yes,
+    )  # fmt: skip
     options = picture_options(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
@@ -113,7 +112,7 @@ def icons(
         float, typer.Option(min=0.1, help="Processor time that one icon may take; not with --scheduler.")
     ] = 20.0,
     dwell: Annotated[float, typer.Option(help="Seconds an icon is shown.")] = 1.0,
-    contrast: Contrast = 20.0,
+    contrast: Contrast = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
     budget: Budget = None,
@@ -156,6 +155,7 @@ def render(
     root: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Refuse a job that leads out of this folder; for jobs of others.")
     ] = None,
+    share: Yield = None,
     actuator: Actuator = None,
     tol: Tol = None,
     budget: Budget = None,
@@ -166,9 +166,9 @@ def render(
 ) -> None:
     """Render a sequence of texts, pictures, icons, textures and pauses.
 
-    Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol and --budget come before
-    what the job says. With --root the job, every file it names and its output lie below a folder, links followed, and
-    its tables are liblouis's own.
+    Nothing is written when a frame cannot be made as asked; the exit code is then 1. --tol, --budget and --yield come
+    before what the job says. With --root the job, every file it names and its output lie below a folder, links
+    followed, and its tables are liblouis's own.
 
     \b
     Example:
@@ -178,7 +178,9 @@ def render(
     from ..request import request_of
     from .options import place_of
 
-    request = request_of(tol=tol, budget=budget, pareto=pareto, explain=explain, actuator=place_of(actuator), yes=yes)
+    request = request_of(
+        tol=tol, budget=budget, pareto=pareto, explain=explain, yield_=share, actuator=place_of(actuator), yes=yes
+    )
     report = render_job(job, output, request, root=root)
     finish(report, as_json, ok=report.ok)
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from drivers import Encoding, FileError, atomic_files, naming
-from planner import DEFAULT_CONTRAST_DB
 
 from .journal import Journal
 from .pool import TASK_S, Pool, Work
@@ -59,7 +58,7 @@ class IconOptions:
     workers: int | None = None
     scheduler: str | None = None
     closer_than: int = 2
-    contrast_db: float = DEFAULT_CONTRAST_DB
+    contrast_db: float | None = None
     dwell_s: float = 1.0
     encoding: Encoding = "float32"
     tol: float | None = None

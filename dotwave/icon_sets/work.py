@@ -89,7 +89,7 @@ class Recipe:
 
     device: Device
     options: PictureOptions
-    contrast_db: float
+    contrast_db: float | None
     encoding: Encoding
     made_by: str
 

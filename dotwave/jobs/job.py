@@ -258,14 +258,16 @@ class Job(Part):
 
     Paths are relative to the job file. `tolerance` says how exact a frame must be to be ok, as `--tol` does (draft,
     normal and fine: 10, 2 and 0.5 % of full scale, or a number in units of it). `presentation` is for the texts that
-    do not say their own. Without `output` the job is planned only.
+    do not say their own. `yield` is the share of devices, drawn with the device's spread, that are to keep what is
+    wished, as `--yield`. Without `output` the job is planned only.
     """
 
     schema_: Literal["dotwave/job/1"] = Field("dotwave/job/1", alias="schema")
     device: DevicePart = DevicePart()
     tolerance: Tolerance = "normal"
     budget: Budget | None = None
-    contrast_db: Annotated[float, Field(ge=6, le=60)] = 20.0
+    contrast_db: Annotated[float, Field(ge=6, le=60)] | None = None
+    yield_: Annotated[float, Field(gt=0, le=1)] | None = Field(None, alias="yield")
     presentation: Presentation = Presentation.TOGETHER
     output: FilePath | None = None
     sample_format: Literal["float32", "pcm24"] = "float32"

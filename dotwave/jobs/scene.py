@@ -48,7 +48,8 @@ class JobScene(DeviceScene):
             given,
             tol=given.tol or job.tol,
             budget_s=given.budget_s or (job.budget.planning_s if job.budget else None),
-            contrast_db=job.contrast_db,
+            contrast_db=given.contrast_db or job.contrast_db,
+            yield_=given.yield_ or job.yield_,
             encoding=job.sample_format,
         )
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from chainsim import load_device
 from drivers import BUFFER_S, ControllerSpec, Emulator, EmulatorStatus, Faults, FaultWindow, read_plant
+from planner import DOT_THRESHOLD
 
 from ..errors import AppError
 from ..plain import printable
-from ..reports.text import DOT_THRESHOLD
 
 __all__ = ["EmulateReport", "dots_as_braille", "emulate", "parse_window"]
 

@@ -21,6 +21,7 @@ from ..request import Request
 from ..scenes import placed
 from ..studies.judge import Judge
 from .extent import extent_of, go_on
+from .presenting import presented
 from .text_findings import text_findings
 
 __all__ = ["render"]
@@ -49,13 +50,14 @@ def render(scene: Scene, device: Device, out: Path | None = None, request: Reque
     """
     began = time.perf_counter()
     request = request or Request()
-    plan = plan_scene(scene, device, contrast_db=request.contrast_db)
+    scene, shown = presented(scene, device, request)
+    plan = plan_scene(scene, device, contrast_db=request.contrast_db, yield_=request.yield_)
     if out is not None and FORMATS[check_suffix(out)].sample_bytes:
         go_on(extent_of(scene.frames, device, out, request.encoding), out, yes=request.yes)
     passage = _Passage(plan, Judge(request), writes=out is not None)
     with placed(scene):
         written = _carried_out(passage, out, request)
-    report = _report(scene, passage, written, request)
+    report = _report(scene, passage, written, request, shown)
     found = passage.judge.findings()
     seconds = time.perf_counter() - began
     return replace(report, reached=found.reached, met=found.met, beside=found.beside, seconds=seconds)
@@ -120,7 +122,9 @@ class _Passage:
             raise _Stopped
 
 
-def _report(scene: Scene, passage: _Passage, written: WrittenPlan | None, request: Request) -> Report:
+def _report(
+    scene: Scene, passage: _Passage, written: WrittenPlan | None, request: Request, shown: tuple[str, ...]
+) -> Report:
     device, totals = passage.plan.device, passage.totals
     peak = totals.volts * device.amplifier.volts
     said: dict[str, Any] = totals.of_report() | {
@@ -132,7 +136,7 @@ def _report(scene: Scene, passage: _Passage, written: WrittenPlan | None, reques
     }
     if isinstance(scene, TextScene):
         found = text_findings(scene)
-        notes = (*found.notes, *passage.notes())
+        notes = (*found.notes, *shown, *passage.notes())
         return TextReport(
             tables=tuple(scene.encoding["tables"]), text=scene.text_frames.source.text[:200], pages=totals.pages,
             undefined=found.undefined, split=found.split, differences=found.differences, notes=notes, **said,

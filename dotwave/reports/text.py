@@ -13,27 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planner import CONTRAST_LIMIT_DB, FrameWish
+
 from ..plain import one_line
 from .report import Report, margin_lines, outcome_lines, plain
 
 __all__ = [
     "AMPLITUDE_ERROR_LIMIT",
-    "CONTRAST_LIMIT_DB",
-    "DOT_THRESHOLD",
     "FrameCheck",
     "TextReport",
     "VerifyReport",
-    "contrast_between",
     "decibels",
 ]
 
 Floats = NDArray[np.float64]
 
-DOT_THRESHOLD = 0.5
-"""An actuator counts as a raised dot from this amplitude on, in units of full scale."""
-
-CONTRAST_LIMIT_DB = 12.0
 AMPLITUDE_ERROR_LIMIT = 0.02
+"""Largest deviation from what is aimed at, in units of full scale."""
+
 LISTED = 20
 
 
@@ -95,7 +92,8 @@ class FrameCheck:
     ----------
     page : page of the frame.
     outcome : what the planner said of it.
-    target, felt : float64, shape (rows, cols), amplitude in units of full scale.
+    target, felt : float64, shape (rows, cols), what is aimed at and what is felt, in units of full scale.
+    wish : what the scene asked for, by which dots and contrast are judged.
     wrong_dots : actuators felt on the wrong side of the threshold.
     contrast_db : weakest wanted dot over the strongest unwanted one; None when the frame lacks either, or has levels.
     amplitude_error : worst deviation from `target`, in units of full scale; of the complex amplitude where phases
@@ -110,6 +108,7 @@ class FrameCheck:
     end_s: float
     outcome: str
     target: Floats
+    wish: FrameWish
     felt: Floats
     wrong_dots: int
     contrast_db: float | None
@@ -135,28 +134,35 @@ class FrameCheck:
     @property
     def wanted_dots(self) -> NDArray[np.bool_]:
         """Which actuators should be felt as raised; bool, shape (rows, cols)."""
-        return self.target >= DOT_THRESHOLD
+        return self.wish.raised
 
     @property
     def felt_dots(self) -> NDArray[np.bool_]:
         """Which actuators are felt as raised; bool, shape (rows, cols)."""
-        return self.felt >= DOT_THRESHOLD
+        return self.felt >= self.wish.threshold
 
     @property
     def ok(self) -> bool:
-        """Right dots, within the limits, and planned as asked; levels asked for with less contrast need none."""
+        """Right dots, as clear as asked, the amplitudes that are aimed at, and planned as asked."""
         exact = self.amplitude_error <= AMPLITUDE_ERROR_LIMIT
         return self.outcome == "ok" and self.wrong_dots == 0 and self.clear and exact
 
     @property
     def clear(self) -> bool:
-        """Dots stand out as far as they should, or no further was planned."""
-        asked = contrast_between(self.wanted_dots, self.target)
-        return self.contrast_db is None or self.contrast_db >= CONTRAST_LIMIT_DB or (asked or 0) < CONTRAST_LIMIT_DB
+        """Dots stand out as far as the wish needs."""
+        return bool(self.wish.clear(self.contrast_db))
+
+    @property
+    def aside(self) -> float:
+        """How far the plan aims beside the wish where something is to be felt, in units of full scale."""
+        wished = self.wish.level > 0
+        return float(np.max(np.abs(self.target - self.wish.level)[wished], initial=0.0))
 
     def as_dict(self) -> dict[str, Any]:
         """The check in plain JSON types."""
-        return {name: plain(value) for name, value in vars(self).items()} | {"ok": self.ok}
+        return {name: plain(value) for name, value in vars(self).items()} | {
+            "wish": plain(self.wish.level), "least_contrast_db": self.wish.least_db, "ok": self.ok,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -230,11 +236,12 @@ class VerifyReport:
         verdict = "Verified" if self.ok else "Verification failed"
         yield f"{verdict}: {self.path} on {self.device}, {_count(len(self.frames), 'frame')}."
         yield f"Wrong dots: {self.wrong_dots}."
-        low = self.contrast_db is not None and self.contrast_db < CONTRAST_LIMIT_DB
-        limit = "the plan asks for no more" if low and all(frame.clear for frame in self.frames) else ""
-        yield f"Lowest contrast: {decibels(self.contrast_db)} ({limit or f'at least {CONTRAST_LIMIT_DB:g} dB wanted'})."
+        yield f"Lowest contrast: {decibels(self.contrast_db)} ({self._contrast_wanted()})."
         worst = f"{100 * self.amplitude_error:.2f} % of full scale"
         yield f"Worst amplitude error: {worst} (at most {100 * AMPLITUDE_ERROR_LIMIT:g} % wanted)."
+        aside = max((frame.aside for frame in self.frames), default=0.0)
+        if aside > AMPLITUDE_ERROR_LIMIT:
+            yield f"What is to be felt is aimed at up to {100 * aside:.0f} % of full scale beside the wish."
         yield f"Longest ramp: {self.ramp_s:.3f} s."
         if self.text_equal is not None:
             yield f"Text felt: {' '.join(self.felt_text.split())}"
@@ -245,6 +252,12 @@ class VerifyReport:
         yield from self.notes
         yield f"Integrated {self.samples} samples at {self.rate_hz} Hz in {self.seconds:.2f} s."
 
+    def _contrast_wanted(self) -> str:
+        needed = [frame.wish.least_db for frame in self.frames if frame.wish.least_db is not None]
+        if not needed and self.contrast_db is not None:
+            return "no more is wished for"
+        return f"at least {max(needed, default=CONTRAST_LIMIT_DB):g} dB wanted"
+
     def _failure(self, number: int) -> str:
         frame = self.frames[number - 1]
         error = f"amplitude error {100 * frame.amplitude_error:.2f} %"
@@ -253,18 +266,6 @@ class VerifyReport:
 
 
 _TOTALS = ("ok", "wrong_dots", "contrast_db", "amplitude_error", "ramp_s")
-
-
-def contrast_between(wanted: NDArray[np.bool_], level: Floats) -> float | None:
-    """Weakest wanted dot over strongest unwanted one in decibels.
-
-    Infinite over silence, None when there are no wanted or no unwanted ones.
-    """
-    if not wanted.any() or wanted.all():
-        return None
-    weakest, strongest = np.abs(level[wanted]).min(), np.abs(level[~wanted]).max()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(20 * np.log10(weakest / strongest))
 
 
 def decibels(value: float | None) -> str:

@@ -19,7 +19,11 @@ from ..reports.printable import Printable
 from ..request import Request
 
 if TYPE_CHECKING:
-    from planner import Question, Requirement
+    from numpy.typing import NDArray
+
+    from planner import FrameSpread, Question, Requirement
+
+    from ..reports.devices import YieldReport
 
 __all__ = ["Findings", "Judge"]
 
@@ -56,6 +60,8 @@ class Judge:
         self._device: Device | None = None
         self._pattern: TargetPattern | None = None
         self._idle = 0.0
+        self._spread: FrameSpread | None = None
+        self._devices: NDArray[np.bool_] | None = None
         self._clock = clock
 
     def judged(self, plan: Plan) -> Iterator[FramePlan]:
@@ -75,7 +81,10 @@ class Judge:
             yield self._verdict(frame)
 
     def _look(self, frame: FramePlan) -> None:
-        request = self.request
+        request, spread = self.request, frame.spread
+        if spread is not None:
+            self._spread = spread
+            self._devices = spread.devices if self._devices is None else self._devices & spread.devices
         if request.tol is None and request.budget_s is None and not request.explain:
             return
         keys = {state.lam.tobytes() + state.bias.tobytes() + repr(state.epsilon).encode() for state in frame.states}
@@ -124,7 +133,23 @@ class Judge:
             if self._pattern is None:
                 raise AppError(f"--pareto: the scene has no frame {request.pareto.number}; count from 1")
             beside["pareto"] = pareto_report(self._pattern, device, request.pareto)
+        devices = self._yield()
+        if devices is not None:
+            beside["yield"] = devices
+            met = met and devices.met
         return Findings(reached, met, beside)
+
+    def _yield(self) -> YieldReport | None:
+        """On how many devices all frames are felt as wished; None where none has a spread."""
+        spread, devices = self._spread, self._devices
+        if spread is None or devices is None:
+            return None
+        from planner import needed_for
+
+        from ..reports.devices import YieldReport
+
+        asked, needed = self.request.yield_ is not None, needed_for(devices, spread.wanted)
+        return YieldReport(float(devices[0].mean()), spread.wanted, asked, needed, spread.spread, spread.draws)
 
     def _required(self, device: Device, tol: float) -> Requirement:
         from planner import assumed, require

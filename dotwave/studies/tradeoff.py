@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from chainsim import Device, load_device
 from encoders import Scene, TargetPattern, TextOptions, encode_text
-from planner import DEFAULT_CONTRAST_DB, Plan, plan_scene
+from planner import Plan, plan_scene
 
 from ..errors import AppError
 from ..reports.html import html_table
@@ -43,12 +43,12 @@ def planned(source: str, device: str | None, *, otherwise: str = "paper-6x6") ->
     if source.lower().endswith((".yaml", ".yml")) and not any(letter.isspace() for letter in source):
         scene, profile, contrast_db = _of_job(Path(source), None if device is None else load_device(device))
     else:
-        profile, contrast_db = load_device(device or otherwise), DEFAULT_CONTRAST_DB
+        profile, contrast_db = load_device(device or otherwise), None
         scene = encode_text(text_source(source), shape_of(profile), TextOptions())
     return scene, plan_scene(scene, profile, contrast_db=contrast_db)
 
 
-def _of_job(path: Path, given: Device | None) -> tuple[Scene, Device, float]:
+def _of_job(path: Path, given: Device | None) -> tuple[Scene, Device, float | None]:
     from ..jobs.scene import read_job_scene
 
     found = read_job_scene(path, device=given)

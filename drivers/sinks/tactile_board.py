@@ -240,7 +240,7 @@ def _frame(number: int, tone: _Tone, gain: int, ramp_s: float) -> BoardFrame:
             f"frame {number}: loading takes {1e3 * load_s:.0f} ms of I2C, the frame lasts {1e3 * duration_s:.0f} ms; "
             "show frames longer"
         )
-    dots = mark.target >= 0.5
+    dots = mark.wish.raised
     dots.flags.writeable = False
     return BoardFrame(mark.start_s, duration_s, dots, records, load_s, skew_s)
 

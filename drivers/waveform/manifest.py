@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
 from encoders import GoesOn
-from planner import FramePlan, OperatingPoint
+from planner import FramePlan, FrameWish, OperatingPoint
 
 from ..channels import Channel, channels_of
 from ..errors import UnreadableWaveform, WaveformError
@@ -50,7 +50,8 @@ class FrameMark:
     phase : float64, shape (rows, cols), read-only, wanted phases in radians, NaN where any will do; those of rows
         with one omega may all be shifted alike.
     moving : for each row whether its target is an amplitude at omega; else it is a deflection.
-    target : float64, shape (rows, cols), read-only, amplitude in units of full scale.
+    target : float64, shape (rows, cols), read-only, amplitude that is aimed at, in units of full scale.
+    wish : what the scene asked for; of an old manifest the target.
     cells, text : what is shown, as Unicode Braille and as source text.
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
@@ -71,6 +72,7 @@ class FrameMark:
     tones: tuple[tuple[float, ...], ...]
     phase: Floats
     moving: tuple[bool, ...]
+    wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
 
 
@@ -264,6 +266,7 @@ class _Spool:
 
 def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
     assert frame.frame is not None
+    assert frame.wish is not None
     per_row = device.chains_per_row
     rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
     mark = {
@@ -272,12 +275,15 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         "end_s": frame.end_s,
         "omega": [_common_omega(row, f"frame {number}, row {index}") for index, row in enumerate(rows)],
         "target": [[_rounded(v) for state in row for v in state.target.tolist()] for row in rows],
+        "wish": [[None if np.isnan(v) else _rounded(v) for v in row] for row in frame.wish.level.tolist()],
         "cells": frame.frame.cells,
         "text": frame.frame.text,
         "outcome": frame.outcome.value,
         "page": frame.frame.page,
         "span": list(frame.frame.span),
     }
+    if frame.wish.contrast_db is not None:
+        mark["contrast_db"] = frame.wish.contrast_db
     if frame.frame.goes_on:
         mark["goes_on"] = [asdict(one) for one in frame.frame.goes_on]
     if any(state.tones for state in frame.states):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -13,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chainsim import Device, Outcome, complaint_of, shown, words_of
 from encoders import GoesOn
+from planner import FrameWish
 
 from ..channels import Channel, Role
 from ..errors import UnreadableWaveform
@@ -67,6 +69,8 @@ class _Frame(_Part):
     end_s: Seconds
     omega: list[Positive]
     target: list[list[Finite]]
+    wish: list[list[Finite | None]] | None = None
+    contrast_db: Positive | None = None
     cells: Words = ""
     text: Words = ""
     outcome: Annotated[Outcome, Field(strict=False)]
@@ -193,9 +197,9 @@ class _Check:
         for name, value in (("tones", frame.tones), ("moving", frame.moving)):
             if value is not None and len(value) != rows:
                 self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
-        phase = frame.phase
-        if phase is not None and (len(phase) != rows or any(len(row) != cols for row in phase)):
-            self._refuse(f"{place}.phase", f"expected {rows} rows of {cols} numbers or null")
+        for name, grid in (("wish", frame.wish), ("phase", frame.phase)):
+            if grid is not None and (len(grid) != rows or any(len(row) != cols for row in grid)):
+                self._refuse(f"{place}.{name}", f"expected {rows} rows of {cols} numbers or null")
         if not frame.start_s <= frame.settled_s <= frame.end_s:
             times = f"start_s {frame.start_s}, settled_s {frame.settled_s}, end_s {frame.end_s}"
             self._refuse(place, f"{times} are not in order")
@@ -224,7 +228,8 @@ def _manifest(file: _File) -> Manifest:
 
 def _mark(frame: _Frame, device: Device) -> FrameMark:
     any_phase = [[None] * device.cols] * device.rows
-    phase = [[math.nan if one is None else one for one in row] for row in frame.phase or any_phase]
+    # What was written before wishes were kept is judged by what it aims at.
+    wish = _frozen(_with_nan(frame.wish or frame.target))
     return FrameMark(
         start_s=frame.start_s,
         settled_s=frame.settled_s,
@@ -237,10 +242,15 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         page=frame.page,
         span=(frame.span[0], frame.span[1]),
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
-        phase=_frozen(phase),
+        phase=_frozen(_with_nan(frame.phase or any_phase)),
         moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
+        wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
     )
+
+
+def _with_nan(rows: Sequence[Sequence[float | None]]) -> list[list[float]]:
+    return [[math.nan if one is None else one for one in row] for row in rows]
 
 
 def _frozen(values: ArrayLike) -> NDArray[np.float64]:

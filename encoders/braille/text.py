@@ -51,7 +51,7 @@ class TextOptions:
         less, (cells it has room for) / rate. None means 6: 1 s for 3 x 2 cells.
     dwell_s : seconds a page lasts, instead of `rate`. Shown in parts, a page gives each part an equal share,
         but at least 0.6 s; it then lasts longer.
-    presentation : dots together, by row, or by dot.
+    presentation : dots together, by row, or by dot. None: together, and whoever plans it may take another.
     blank_between : a blank frame between paragraphs.
     dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
 
@@ -69,13 +69,15 @@ class TextOptions:
     line_gap: int = 0
     rate: float | None = None
     dwell_s: float | None = None
-    presentation: Presentation = Presentation.TOGETHER
+    presentation: Presentation | None = None
     blank_between: bool = False
     dots: int | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (("undefined", Undefined), ("presentation", Presentation)):
             given = getattr(self, name)
+            if given is None and name == "presentation":
+                continue
             if given not in list(kind):
                 raise LayoutError(f"{name}: expected one of {', '.join(kind)}, got {given!r}")
             object.__setattr__(self, name, kind(given))
@@ -134,7 +136,7 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
         "hyphen": layout.hyphen,
         "continuation": layout.continuation,
         "passages": transcriber.passages,
-        "presentation": options.presentation.value,
+        "presentation": (options.presentation or Presentation.TOGETHER).value,
         "undefined": options.undefined.value,
         "liblouis": louis_binding.liblouis_version(),
     }
@@ -212,11 +214,11 @@ class TextFrames:
         self.source = source
         self.layout = layout
         self._transcriber = transcriber
-        self._options = options
+        self.options = options
         self._encoding = encoding
         self._log = ReportLog()
         self._kept: tuple[Frame, ...] | None = None
-        self._show = presenter(layout, options.presentation)
+        self._show = presenter(layout, options.presentation or Presentation.TOGETHER)
         rate = options.rate or DEFAULT_RATE
         self._s_per_cell = 0.0 if options.dwell_s else 1 / rate
         self._shortest_s = options.dwell_s or min(SHORT_PAGE_S, layout.capacity / rate)
@@ -258,7 +260,7 @@ class TextFrames:
             log.frames += len(shown.parts)
             log.cells += len(page.cells) - page.cells.count(BLANK)
             log.pages += 1
-            between = self._options.blank_between and page.end_of_paragraph
+            between = self.options.blank_between and page.end_of_paragraph
 
     def _blank_frame(self, log: ReportLog, position: int) -> Frame:
         amplitude = np.zeros((self.layout.shape.rows, self.layout.shape.cols), dtype=np.complex128)

@@ -67,11 +67,11 @@ def choose_band(device: Device, contrast_db: float, chains: Sequence[Device] = (
     for lower in (LOWER, EQUAL):
         lacking, possible = "", list[Band]()
         probes = _probes(device, floor, lower)
-        for omega in np.linspace(device.omega.max, device.omega.min, CANDIDATES):
-            for ramp_s in _ramps_s(device, float(omega)):
-                found = next(filter(None, (_lack(one, float(omega), ramp_s, probes) for one in every)), "")
+        for omega in dict.fromkeys(np.linspace(device.omega.max, device.omega.min, CANDIDATES).tolist()):
+            for ramp_s in _ramps_s(device, omega):
+                found = next(filter(None, (_lack(one, omega, ramp_s, probes) for one in every)), "")
                 if not found:
-                    possible.append(Band(float(omega), ramp_s, floor, lower))
+                    possible.append(Band(omega, ramp_s, floor, lower))
                     break
                 lacking = lacking or found
             if possible and device.spread is None:

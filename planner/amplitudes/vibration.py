@@ -18,6 +18,7 @@ from ..family import AmplitudeFamily, PatternFamily
 from ..margins import WELL_SHARE, converter_error, lacking_of, slew_of
 from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
+from ..targets import AmplitudeTarget, ChainTarget, DotGoal
 from ..transitions import jets
 from ..transitions.envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
 from ..transitions.hermite import broken_line
@@ -86,21 +87,27 @@ class Vibration(AmplitudeFamily):
         """What is lacking."""
         return f"{self.device.name} cannot make this pattern by vibration: {self.band.lacking or 'it is out of reach'}."
 
-    def states(self, targets: Floats) -> list[OperatingPoint]:
+    def points(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
+        """All of them in one array, with what they are aimed by."""
+        goals = [target.dots if isinstance(target, AmplitudeTarget) else None for target in targets]
+        return self.states(np.array([target.amplitude for target in targets]), goals)
+
+    def states(self, targets: Floats, goals: Sequence[DotGoal | None] = ()) -> list[OperatingPoint]:
         """Settings for amplitude targets; all zero is rest, and so is what no links can hold (unreachable).
 
-        Under spread the states aim beside the targets, where the expected error is least.
+        Under spread the states aim beside the targets: with a goal where most devices keep their dots, else where the
+        expected error is least.
         """
-        if self.device.spread is None:
+        if self.device.spread is None or self.band.lacking:
             return self._exact(targets)
-        aims = self._aims(targets)
+        aims = self._aims(targets, goals or [None] * len(targets))
         found = self._exact(aims)
         for i in np.flatnonzero(np.any(aims != targets, axis=1)):
             if found[i].outcome is not Outcome.OK:
                 found[i] = self._exact(targets[[i]])[0]
         return [self._rounded(state) for state in found]
 
-    def _aims(self, targets: Floats) -> Floats:
+    def _aims(self, targets: Floats, goals: Sequence[DotGoal | None]) -> Floats:
         from ..robustness.robust_aim import aim_for
 
         amplitude = targets * self.device.full_scale
@@ -108,8 +115,8 @@ class Vibration(AmplitudeFamily):
         known[known] = np.isfinite(links_for(self.device.chain, amplitude[known], self.band.omega)).all(axis=1)
         whole = (self._whole or self).device
         common = self.band.omega, whole.rows * whole.chains_per_row
-        pairs = zip(targets, known, strict=True)
-        return np.array([aim_for(self.device, one, *common) if fine else one for one, fine in pairs])
+        asked = zip(targets, goals, known, strict=True)
+        return np.array([aim_for(self.device, one, *common, goal) if fine else one for one, goal, fine in asked])
 
     def _rounded(self, state: OperatingPoint) -> OperatingPoint:
         """With what the steps of a converter leave."""

@@ -149,6 +149,14 @@ class RobustSearch:
         shares[np.argsort(error)] = np.diff((np.arange(count + 1) / count) ** self.copies)
         return shares
 
+    def cost(self, row: TradeRow) -> float:
+        """What settings are compared by: less is better."""
+        return self.worst_of(row.report.error)
+
+    def best(self, start: OperatingPoint) -> OperatingPoint:
+        """The setting at the frequency of `start` that costs least near it."""
+        return self.least(start, free_omega=False)
+
     def least(self, start: OperatingPoint, *, free_omega: bool, free_lam: bool = True) -> OperatingPoint:
         """The setting with the least expected error near `start`, within what the device can set."""
         from scipy.optimize import minimize

@@ -72,6 +72,7 @@ def test_a_manifest_says_what_the_plan_says(tmp_path: Path) -> None:
     ]
     assert [m.outcome for m in manifest.frames] == [Outcome.OK, Outcome.UNREACHABLE, Outcome.OK]
     np.testing.assert_allclose(manifest.frames[0].target, np.full((6, 6), 1 / 3), rtol=1e-12)
+    np.testing.assert_array_equal([mark.wish.level[0, 0] for mark in manifest.frames], [1, 0, 1])
     np.testing.assert_array_equal(manifest.frames[0].omega, [1.25] * 6)
     assert not manifest.frames[0].target.flags.writeable
     lam = manifest.lam_at(np.array([0.0, 0.02, 0.05, 0.11, 0.39]))
@@ -91,7 +92,7 @@ def test_the_manifest_has_the_keys_of_the_design(tmp_path: Path) -> None:
     assert data["channels"][6] == {"index": 6, "role": "bias", "row": 0, "col": 0, "volts_per_unit": 100.0}
     assert {"rows", "cols", "f0_hz", "delta", "beta", "full_scale"} <= set(data["device"])
     assert list(data["coupling"][0]) == ["t_s", "row", "lam", "ramp_s"]
-    keys = "start_s settled_s end_s omega target cells text outcome page span"
+    keys = "start_s settled_s end_s omega target wish cells text outcome page span"
     assert list(data["frames"][0]) == keys.split()
     assert "«0»" in (tmp_path / "x.json").read_text(encoding="utf-8")
 

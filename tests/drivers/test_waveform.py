@@ -17,10 +17,12 @@ from chainsim import Device, Outcome
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
 from drivers.waveform.coupling import CouplingWriter, LamTrack
 from drivers.waveform.timeline import PlacedFrame
-from encoders import Frame
+from encoders import Frame, TargetPattern
 from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
 from tests.support.known import known
-from tests.support.plans import NAMES, PATTERN, load
+from tests.support.plans import NAMES, load
+
+PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
 
 
 def state(

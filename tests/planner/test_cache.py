@@ -47,9 +47,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     def counting(kind: type[AmplitudeFamily]) -> None:
         plain_states, plain_ramps = kind.states, kind.ramps
 
-        def states(self: AmplitudeFamily, targets: NDArray[np.float64]) -> list[OperatingPoint]:
+        def states(self: AmplitudeFamily, targets: NDArray[np.float64], *goals: object) -> list[OperatingPoint]:
             done["states"] += len(targets)
-            return plain_states(self, targets)
+            return plain_states(self, targets, *goals)
 
         def ramps(
             self: AmplitudeFamily, before: list[OperatingPoint], after: list[OperatingPoint], moves: bool

@@ -10,7 +10,6 @@ from encoders import Frame, TargetPattern
 from planner import FramePlan, Margins, OperatingPoint, Plan, Ramp
 
 NAMES = ["linked-6x6", "paper-6x6", "independent-6x6", "linked-40x96"]
-PATTERN = TargetPattern(np.zeros((1, 1), dtype=np.complex128))
 
 
 def load(name: str) -> Device:
@@ -53,7 +52,8 @@ def frames(device: Device, count: int, dwell_s: float = 0.1) -> Iterator[FramePl
             lam_t_s=t_s if device.coupling.scope == "link" else None,
             lam=before.lam + np.outer(mix, held.lam - before.lam) if device.coupling.scope == "link" else None,
         )
-        shown = None if k == count else Frame(PATTERN, dwell_s, page=k, text=f"«{k}»", span=(k, k + 1), cells="⠁\n⠃")
+        pattern = TargetPattern(np.full((device.rows, device.cols), 1 - k % 2, dtype=np.complex128))
+        shown = None if k == count else Frame(pattern, dwell_s, page=k, text=f"«{k}»", span=(k, k + 1), cells="⠁\n⠃")
         start_s = k * dwell_s
         yield FramePlan(
             shown, start_s, start_s + 0.04, start_s + dwell_s, (held,) * chains, (ramp,) * chains,

@@ -26,6 +26,7 @@ from chainsim import device_names
 from dotwave.errors import AppError
 from dotwave.reports.text import FrameCheck, TextReport, VerifyReport
 from dotwave.source import text_source
+from planner import FrameWish
 
 ROOT = Path(__file__).resolve().parents[3]
 BRIEF = TextReport(
@@ -37,7 +38,8 @@ BRIEF = TextReport(
 def frame(target: list[list[float]], felt: list[list[float]]) -> FrameCheck:
     wanted, got = np.array(target), np.array(felt)
     wrong = int(np.sum((wanted >= 0.5) != (got >= 0.5)))
-    return FrameCheck(0, 0.0, 0.3, 1.0, "ok", wanted, got, wrong, 20.0, float(np.abs(wanted - got).max()))
+    error = float(np.abs(wanted - got).max())
+    return FrameCheck(0, 0.0, 0.3, 1.0, "ok", wanted, FrameWish(wanted), got, wrong, 20.0, error)
 
 
 GOOD = VerifyReport("x.wav", "paper-6x6", (frame([[1, 0]], [[1, 0]]),), 8000, 8000, "a", "a", True)

@@ -20,6 +20,7 @@ from dotwave.figures.preview import write_preview
 from dotwave.icon_sets.build import IconOptions, render_icons
 from dotwave.plain import csv_cell, html_words, one_line, printable
 from dotwave.reports.text import FrameCheck, VerifyReport
+from planner import FrameWish
 
 ROOT = Path(__file__).resolve().parents[3]
 HEART = ROOT / "samples" / "icons" / "heart.svg"
@@ -105,7 +106,8 @@ def check(text: str) -> FrameCheck:
     target = np.full((6, 6), 0.1)
     target[0, 0] = 1.0
     return FrameCheck(
-        0, 0.0, 0.3, 1.0, f"odd{NASTY}", target, target.copy(), 0, 20.0, 0.0, "⠁⠀⠀\n⠀⠀⠀", "⠁⠀⠀\n⠀⠀⠀", text
+        0, 0.0, 0.3, 1.0, f"odd{NASTY}", target, FrameWish(target), target.copy(), 0, 20.0, 0.0,
+        "⠁⠀⠀\n⠀⠀⠀", "⠁⠀⠀\n⠀⠀⠀", text,
     )  # fmt: skip
 
 

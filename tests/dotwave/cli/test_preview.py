@@ -18,6 +18,7 @@ from dotwave.figures.preview import FRAMES_PER_PICTURE, write_preview
 from dotwave.reports.spoken import spoken
 from dotwave.reports.text import FrameCheck, VerifyReport
 from drivers import DriverError
+from planner import FrameWish
 
 
 def frame(number: int = 0, *, text: str = "He", dwell_s: float = 1.0, shape: tuple[int, int] = (6, 6)) -> FrameCheck:
@@ -25,7 +26,7 @@ def frame(number: int = 0, *, text: str = "He", dwell_s: float = 1.0, shape: tup
     target[0, 0] = 1.0
     start = number * dwell_s
     return FrameCheck(
-        number, start, start + 0.3, start + dwell_s, "ok", target, target.copy(), 0, 20.0, 0.0,
+        number, start, start + 0.3, start + dwell_s, "ok", target, FrameWish(target), target.copy(), 0, 20.0, 0.0,
         "⠁⠀⠀\n⠀⠀⠀", "⠁⠀⠀\n⠀⠀⠀", text,
     )  # fmt: skip
 

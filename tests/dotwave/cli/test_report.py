@@ -13,10 +13,12 @@ from hypothesis.extra import numpy as arrays
 
 from dotwave.reports.report import plain
 from dotwave.reports.text import FrameCheck, TextReport, VerifyReport, decibels
+from planner import FrameWish
 
 GOOD = FrameCheck(
     page=0, start_s=0.0, settled_s=0.3, end_s=1.0, outcome="ok", target=np.array([[1.0, 0.1]]),
-    felt=np.array([[0.99, 0.1]]), wrong_dots=0, contrast_db=19.9, amplitude_error=0.01, text="a",
+    wish=FrameWish(np.array([[1.0, 0.0]])), felt=np.array([[0.99, 0.1]]), wrong_dots=0, contrast_db=19.9,
+    amplitude_error=0.01, text="a",
 )  # fmt: skip
 REPORT = VerifyReport("a.wav", "linked-6x6", (GOOD, GOOD), 16000, 8000, "aa", "aa", True, seconds=0.5)
 TEXT = TextReport(

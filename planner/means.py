@@ -1,0 +1,46 @@
+"""What a whole scene is planned with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from encoders import Frame
+
+from .frame_change import Change, change_to
+from .memory import Memory
+from .outlook import MeansTried
+from .targets import AS_WISHED, ChainTarget, DotGoal
+from .wish import FrameWish
+
+__all__ = ["Means"]
+
+
+@dataclass(frozen=True)
+class Means:
+    """What a scene is planned with.
+
+    Attributes
+    ----------
+    memory : plans chains for the device, with its range of omega cut down to what is used; for one without a spread
+        where nothing is aimed beside the wish.
+    dots : what dots are aimed by; None: they are aimed at as they are wished.
+    tried : all means that were tried, in order; empty where there was no choice.
+    share : of devices that keep the first frames of the scene; None where there was no choice.
+    """
+
+    memory: Memory
+    dots: DotGoal | None = None
+    tried: tuple[MeansTried, ...] = ()
+    share: float | None = None
+
+    def change(self, before: list[ChainTarget], frame: Frame) -> Change:
+        """The change from what chains hold to a frame.
+
+        Where no way leads to dots as they are aimed at, they are aimed at as they are wished.
+        """
+        dots = self.dots if FrameWish.of(frame).dots else None
+        change = change_to(self.memory, before, self.memory.hold(frame.pattern, before, dots))
+        if dots is None or change.made:
+            return change
+        wished = replace(dots, loudest=AS_WISHED)
+        return change_to(self.memory, before, self.memory.hold(frame.pattern, before, wished))
