@@ -14,10 +14,11 @@ from .errors import ContrastError, DwellTooShort, SceneDoesNotFit
 from .frame_change import Change, change_to
 from .memory import Memory
 from .operating_point import OperatingPoint
-from .plan import FramePlan, Plan
+from .plan import AMPLITUDE_ERROR_LIMIT, FramePlan, Plan
 from .targets import AmplitudeTarget
 
 if TYPE_CHECKING:
+    from .following import Following
     from .robustness.expected import Expectation
 
 __all__ = ["DEFAULT_CONTRAST_DB", "plan_scene"]
@@ -65,6 +66,7 @@ class _Frames:
         self._scene = scene
         self._memory = _memory_of(device, contrast_db)
         self._device = device
+        self._following: Following | None = None
         self._expected: Expectation | None = None
         if device.spread is not None:
             from .robustness.expected import Expectation
@@ -76,6 +78,7 @@ class _Frames:
         rate = device.amplifier.rate_hz
         targets = memory.at_rest
         position = 0
+        self._following = None
         for frame in self._scene.frames:
             change = change_to(memory, targets, memory.hold(frame.pattern, targets))
             # What cannot be held is not played, and the next frame begins at rest.
@@ -83,6 +86,8 @@ class _Frames:
             targets = change.targets if played else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
+            if not played and self._following is not None:
+                self._following.rest()
             position += samples
         change = change_to(memory, targets, memory.at_rest)
         if any(ramp is not None for ramp in change.ramps):
@@ -98,10 +103,24 @@ class _Frames:
                 f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
-        whole = self._judged(FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps))
+        residue = self._left(change, start_s, longest, end_s - start_s)
+        whole = self._judged(
+            FramePlan(frame, start_s, start_s + longest, end_s, change.states, change.ramps, residue=residue)
+        )
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
         return replace(whole, spread=self._expected.of(change.targets, change.states))
+
+    def _left(self, change: Change, start_s: float, settled_s: float, length_s: float) -> float:
+        """What changes leave that is felt in a frame, in units of full scale."""
+        if self._following is None:
+            if all(ramp is None or ramp.residue is None for ramp in change.ramps):
+                return 0.0
+            from .following import Following
+
+            self._following = Following(self._device)
+        moments = (self._device.tau_per_s * at_s for at_s in (start_s, settled_s, length_s - settled_s))
+        return self._following.through(change.states, change.ramps, *moments)
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
@@ -111,6 +130,13 @@ class _Frames:
             if ramp is not None and ramp.lacking:
                 note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
+        if plan.frame is not None and plan.residue > AMPLITUDE_ERROR_LIMIT:
+            note = (
+                f"{self._device.name} cannot change to this pattern: what changes leave rings on at "
+                f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
+                "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+            )
+            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
         return plan
 
     def _note(self, state: OperatingPoint) -> str:

@@ -17,6 +17,7 @@ from ..equations.coupling import Closure, law_of
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
+from .surroundings import DeviceSurroundings
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
@@ -129,6 +130,7 @@ class Device(_Part):
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
         lam: 0.0}`` (relative standard deviations). Plans then minimise the expected error. None: they are as they say.
+    surroundings : what acts on it besides, ``{amplifier_noise: 1.0e-5}``; plans count it as error. None: nothing does.
     notes : field name -> where the value comes from.
 
     Examples
@@ -162,6 +164,7 @@ class Device(_Part):
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
+    surroundings: DeviceSurroundings | None = None
     notes: dict[str, Note] = {}
 
     @model_validator(mode="after")
@@ -291,7 +294,7 @@ class Device(_Part):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        left_out = {"spread"} if self.spread is None else set()
+        left_out = {name for name in ("spread", "surroundings") if getattr(self, name) is None}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..closed_forms.links import drive_for, links_for
-from ..margins import converter_error
+from ..margins import noise_error
 from ..operating_point import OperatingPoint
 from ..outlook import FrameSpread, TradePoint
 from ..targets import AmplitudeTarget, ChainTarget
@@ -192,7 +192,7 @@ class Expectation:
         report = judge(
             frame_target(device, there), motion_of(set_to, parts, ring), tolerance=TOLERANCE, threshold=THRESHOLD
         )
-        noise = max(converter_error(device, one) for one in there)
+        noise = max(noise_error(device, one) for one in there)
         return _Drawn((report.error + noise / device.full_scale).astype(np.float32), report.right)
 
     def _place(self, i: int) -> tuple[int, int]:
