@@ -37,8 +37,9 @@ def frame_note(mark: FrameMark) -> bytes:
     return _packed(
         {
             "start_s": mark.start_s, "settled_s": mark.settled_s, "end_s": mark.end_s,
-            "omega": mark.omega.tolist(), "target": mark.target.tolist(), "cells": mark.cells, "text": mark.text,
-            "outcome": mark.outcome.value, "page": mark.page, "span": list(mark.span),
+            "moving": list(mark.moving), "omega": mark.omega.tolist(), "target": mark.target.tolist(),
+            "cells": mark.cells, "text": mark.text, "outcome": mark.outcome.value, "page": mark.page,
+            "span": list(mark.span),
             **({"goes_on": [asdict(one) for one in mark.goes_on]} if mark.goes_on else {}),
         }
     )  # fmt: skip

@@ -28,6 +28,7 @@ MOST_HZ = 10_000_000
 MOST_SAMPLES = 1 << 60
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # A length to hold to also makes sure that it is text which can be written: JSON can name half a character.
 Words = Annotated[str, Field(max_length=1_000_000)]
@@ -65,7 +66,7 @@ class _Frame(_Part):
     start_s: Seconds
     settled_s: Seconds
     end_s: Seconds
-    omega: list[Positive]
+    omega: list[NotNegative]
     target: list[list[Finite]]
     cells: Words = ""
     text: Words = ""
@@ -193,6 +194,9 @@ class _Check:
         for name, value in (("tones", frame.tones), ("moving", frame.moving)):
             if value is not None and len(value) != rows:
                 self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
+        for row, (omega, moves) in enumerate(zip(frame.omega, _moving(frame, self._device), strict=True)):
+            if moves and not omega:
+                self._refuse(f"{place}.omega[{row}]", "expected a number above 0 where a row moves, got 0")
         phase = frame.phase
         if phase is not None and (len(phase) != rows or any(len(row) != cols for row in phase)):
             self._refuse(f"{place}.phase", f"expected {rows} rows of {cols} numbers or null")
@@ -238,9 +242,14 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         span=(frame.span[0], frame.span[1]),
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
         phase=_frozen(phase),
-        moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
+        moving=_moving(frame, device),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
     )
+
+
+def _moving(frame: _Frame, device: Device) -> tuple[bool, ...]:
+    """Whether rows move: where a file from before that was written does not say it, all do, or all stand on a bias."""
+    return tuple([device.bias == "none"] * device.rows if frame.moving is None else frame.moving)
 
 
 def _frozen(values: ArrayLike) -> NDArray[np.float64]:
