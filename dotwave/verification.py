@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
 from encoders import FeltPage, back_check, covered_text, read_cells
+from planner import AMPLITUDE_ERROR_LIMIT
 
 from .progress import progress
-from .reports.text import AMPLITUDE_ERROR_LIMIT, DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
+from .reports.text import DOT_THRESHOLD, FrameCheck, VerifyReport, contrast_between
 
 __all__ = ["verify"]
 

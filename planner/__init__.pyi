@@ -59,6 +59,7 @@ from .outlook import (
     TradePoint as TradePoint,
 )
 from .plan import (
+    AMPLITUDE_ERROR_LIMIT as AMPLITUDE_ERROR_LIMIT,
     FramePlan as FramePlan,
     Plan as Plan,
     Ramp as Ramp,

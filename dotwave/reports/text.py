@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planner import AMPLITUDE_ERROR_LIMIT
+
 from ..plain import one_line
 from .report import Report, margin_lines, outcome_lines, plain
 
 __all__ = [
-    "AMPLITUDE_ERROR_LIMIT",
     "CONTRAST_LIMIT_DB",
     "DOT_THRESHOLD",
     "FrameCheck",
@@ -33,7 +34,6 @@ DOT_THRESHOLD = 0.5
 """An actuator counts as a raised dot from this amplitude on, in units of full scale."""
 
 CONTRAST_LIMIT_DB = 12.0
-AMPLITUDE_ERROR_LIMIT = 0.02
 LISTED = 20
 
 

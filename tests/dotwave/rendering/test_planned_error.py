@@ -6,12 +6,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from chainsim import Device, Outcome, load_device
+from chainsim.compiled import compiled
 from dotwave.verification import verify
 from drivers import read_waveform, write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern
@@ -47,7 +47,7 @@ def written(frames: list[FramePlan], path: Path) -> Path:
     return path
 
 
-@numba.njit
+@compiled
 def row_by_runge_kutta(push: Floats, lam: Floats, delta: float, beta: float, dtau: float) -> Floats:
     """Positions of a chain from rest, by the fourth order, two steps from sample to sample, all straight between."""
     count, n = lam.shape
