@@ -125,8 +125,7 @@ class Following:
             if len(self._kept) >= MOST_KEPT:
                 self._kept.clear()
             matrix = ringing(self._chains[place], state.lam * self._gains[place], np.abs(state.phasor))
-            settled = exponential(matrix * waiting)
-            self._kept[key] = _Ringing(
-                first_harmonic(matrix, state.omega, standing) @ settled, exponential(matrix * standing) @ settled
-            )
+            settled, over = exponential(matrix * waiting), exponential(matrix * standing)
+            felt = first_harmonic(matrix, state.omega, standing, over)
+            self._kept[key] = _Ringing(felt @ settled, over @ settled)
         return self._kept[key]

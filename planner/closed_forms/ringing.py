@@ -79,12 +79,13 @@ def carried(chain: Chain, lam: Floats, amplitude: Floats, duration: float) -> Fl
     return np.asarray(pieces[0])
 
 
-def first_harmonic(matrix: Floats, omega: float, span: float) -> Complexes:
+def first_harmonic(matrix: Floats, omega: float, span: float, over: Floats) -> Complexes:
     """What is felt of a deviation at `omega` while it rings for a `span` in tau: this matrix times its begin.
 
     Parameters
     ----------
     matrix : float64, shape (2n, 2n), as `ringing` gives it.
+    over : its `exponential` over the span.
 
     Returns
     -------
@@ -92,5 +93,5 @@ def first_harmonic(matrix: Floats, omega: float, span: float) -> Complexes:
     """
     n = len(matrix) // 2
     shifted = matrix - 1j * omega * np.eye(2 * n)
-    whole = exponential(matrix * span) * np.exp(-1j * omega * span) - np.eye(2 * n)
+    whole = over * np.exp(-1j * omega * span) - np.eye(2 * n)
     return np.asarray(2 / span * np.linalg.solve(shifted, whole)[:n])

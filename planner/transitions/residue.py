@@ -94,14 +94,14 @@ def _followed(device: Device, ways: Sequence[_Way]) -> list[Floats]:
     tau = np.arange(steps + 2, dtype=np.float64) * dtau
     phased = [(way, phase) for way in ways for phase in PHASES]
     force = np.stack([samples(device, way.after, way.ramp, tau, phase / omega) for way, phase in phased], axis=1)
-    links = np.stack([links_at(way.after, way.ramp, tau / device.tau_per_s) for way, _ in phased], axis=1)
     ahead = np.stack([_ahead(device, way, dtau, phase) for way, phase in phased], axis=1)
-    held = np.stack([(way.after if way.before.resting else way.before).lam for way, _ in phased])
-    closing = np.zeros((len(phased), 1))
-    z = full_motion(
-        device.chain, dtau, force, np.concatenate([np.zeros((len(tau), *closing.shape)), links], axis=2),
-        before=(ahead, np.concatenate([closing, held], axis=1)),
-    )[-3:]  # fmt: skip
+    # The first of a chain has no link; phases of a way have the same.
+    links, held = np.zeros((len(tau), len(phased), device.chain.n)), np.zeros((len(phased), device.chain.n))
+    for at, way in enumerate(ways):
+        both = slice(at * len(PHASES), (at + 1) * len(PHASES))
+        links[:, both, 1:] = links_at(way.after, way.ramp, tau / device.tau_per_s)[:, None]
+        held[both, 1:] = (way.after if way.before.resting else way.before).lam
+    z = full_motion(device.chain, dtau, force, links, before=(ahead, held))[-3:]
     away = z - np.stack([way.end.at(tau[-3:] + phase / omega) for way, phase in phased], axis=1)
     away[:, :, 0] += _corners(omega * dtau) / omega**2 * force[-3:] * FirstOrderHold.of(omega, dtau).passed
     states = np.concatenate([away[1], (away[2] - away[0]) / (2 * dtau)], axis=1)
