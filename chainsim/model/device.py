@@ -17,9 +17,8 @@ from ..equations.coupling import Closure, law_of
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .surroundings import DeviceSurroundings
 
-__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+__all__ = ["Amplifier", "Coupling", "Device", "DeviceSurroundings", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
@@ -91,6 +90,16 @@ class Amplifier(_Part):
     def volt_step(self) -> float:
         """From one voltage to the next; 0 where any can be made."""
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
+
+
+class DeviceSurroundings(_Part):
+    """What acts on a device beside what it is made of and told to do; what is left out is nothing.
+
+    `amplifier_noise` is the root mean square of what an amplifier adds to its output, spread evenly up to half of
+    `rate_hz`, as a share of its `volts`.
+    """
+
+    amplifier_noise: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
 
 
 class Note(_Part):
