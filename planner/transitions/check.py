@@ -110,8 +110,8 @@ class Orbit:
         z, v, a = ((turning * rate**k @ self.harmonics).real for k in range(3))
         moved = step[:, None] * z
         force = (
-            step[:, None] * a + slope[:, None] * (2 * v + chain.delta * z) / length + bend[:, None] * z / length**2
-            + step[:, None] * chain.delta * v + moved + chain.beta * moved**3
+            step[:, None] * a + slope[:, None] * (2 * v + chain.deltas * z) / length + bend[:, None] * z / length**2
+            + step[:, None] * chain.deltas * v + chain.stiffness * moved + chain.betas * moved**3
         )  # fmt: skip
         force[:, 1:] -= self.lam * (moved[:, :-1] - moved[:, 1:])
         return np.asarray(force)

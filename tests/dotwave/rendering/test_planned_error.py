@@ -41,9 +41,9 @@ def mixed_and_raised(seed: int) -> list[Floats]:
     return [rng.integers(0, 2, (6, 6)).astype(float), raised, rng.integers(0, 2, (6, 6)).astype(float), raised]
 
 
-def written(frames: list[FramePlan], path: Path) -> Path:
+def written(frames: list[FramePlan], path: Path, device: Device = LINKED) -> Path:
     """The file of frames whether or not they were refused."""
-    write_waveform(Plan(LINKED, [replace(frame, outcome=Outcome.OK, note="") for frame in frames], {}), path)
+    write_waveform(Plan(device, [replace(frame, outcome=Outcome.OK, note="") for frame in frames], {}), path)
     return path
 
 
@@ -114,6 +114,17 @@ def test_what_changes_leave_is_in_the_error_and_refused(tmp_path: Path) -> None:
     assert [frame.outcome for frame in frames[:4]] == [Outcome.OK, Outcome.OK, Outcome.UNREACHABLE, Outcome.OK]
     assert "rings on" in frames[2].note
     assert all(state.error < 1e-9 for frame in frames for state in frame.states)
+
+
+def test_actuators_that_were_measured_ring_with_their_own_numbers(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    places = [(row, col, LINKED.f0_hz * (1 + 0.01 * rng.standard_normal())) for row in range(6) for col in range(6)]
+    actuators = [{"row": row, "col": col, "f0_hz": f0_hz} for row, col, f0_hz in places]
+    device = Device.model_validate(LINKED.as_dict() | {"actuators": actuators})
+    frames = planned([rng.integers(0, 2, (6, 6)).astype(float) for _ in range(2)], device)
+    felt = [check.amplitude_error for check in verify(written(frames, tmp_path / "dots.wav", device)).frames]
+    for frame, error in zip(frames, felt, strict=False):
+        assert 0.5 * error <= frame.error <= 20 * error + 1e-4
 
 
 def test_rows_that_ring_on_are_told_from_those_that_do_not() -> None:
