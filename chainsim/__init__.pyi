@@ -99,6 +99,7 @@ from .model.device import (
     Amplifier as Amplifier,
     Coupling as Coupling,
     Device as Device,
+    DeviceSurroundings as DeviceSurroundings,
     Note as Note,
     Span as Span,
     device_names as device_names,

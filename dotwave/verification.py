@@ -31,10 +31,11 @@ BLOCK_VALUES = 1 << 20
 class _Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
-    `level` is what is compared with wish and target: the mean of a bias pattern, else the amplitude at the
-    drive's frequency, or the sum of those at all its tones. `still` and `moving` are both of them. `error` is the
-    deviation from the target: of the complex amplitude where phases are wanted, of the worst tone where there are
-    several.
+    `level` is what is compared with wish and target: the mean of a bias pattern, else the amplitude at the drive's
+    frequency, or the sum of those at all its tones; where nothing is to move without a bias, the amplitude of all that
+    does.
+    `still` and `moving` are both of them. `error` is the deviation from the target: of the complex amplitude where
+    phases are wanted, of the worst tone where there are several.
     """
 
     level: Floats
@@ -135,6 +136,7 @@ class _Fit:
         sizes = [1 + 2 * len(rates) for rates in self._rates]
         self._gram = [np.zeros((size, size)) for size in sizes]
         self._load = [np.zeros((size, device.cols)) for size in sizes]
+        self._squares = np.zeros((device.rows, device.cols))
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
@@ -146,6 +148,8 @@ class _Fit:
                 basis = np.stack([np.ones_like(tau), *waves])
             self._gram[row] += basis @ basis.T
             self._load[row] += basis @ z[inside, row]
+            if not rates:
+                self._squares[row] += (z[inside, row] ** 2).sum(axis=0)
 
     def felt(self) -> _Felt:
         """What is felt; NaN where the frame has too few samples to tell."""
@@ -153,17 +157,23 @@ class _Fit:
         if self._gram[0][0, 0] < max(map(len, self._gram)):
             nothing = np.full(shape, np.nan)
             return _Felt(nothing, nothing, nothing, nothing)
-        still, phasor, moving = np.empty(shape), np.empty(shape, dtype=np.complex128), np.empty(shape)
-        worst = np.empty(shape)
+        still, phasor, moving = np.zeros(shape), np.zeros(shape, dtype=np.complex128), np.zeros(shape)
+        worst = np.zeros(shape)
         for row, (gram, load) in enumerate(zip(self._gram, self._load, strict=True)):
             parts = np.linalg.lstsq(gram, load)[0] / full
+            still[row] = parts[0]
+            if not mark.omega[row]:
+                # At no frequency: all that moves is too much.
+                moving[row] = np.sqrt(2 * np.maximum(self._squares[row] / gram[0, 0] / full**2 - still[row] ** 2, 0.0))
+                continue
             count = 1 + len(mark.tones[row])
             tones = parts[1 : 1 + 2 * count : 2] - 1j * parts[2 : 2 + 2 * count : 2]
-            still[row], phasor[row], moving[row] = parts[0], tones[0], np.abs(tones).sum(axis=0)
+            phasor[row], moving[row] = tones[0], np.abs(tones).sum(axis=0)
             worst[row] = np.abs(count * np.abs(tones) - mark.target[row]).max(axis=0)
         standing = ~np.array(mark.moving)
-        worst[standing] = np.abs(still - mark.target)[standing]
-        level = np.where(standing[:, np.newaxis], still, moving)
+        # Without a bias nothing but a motion can be felt of a row that is to stand still.
+        level = np.where((standing & (self._device.bias == "actuator"))[:, np.newaxis], still, moving)
+        worst[standing] = np.abs(level - mark.target)[standing]
         return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
 
     def _out_of_phase(self, phasor: Complexes) -> Floats:
@@ -179,8 +189,8 @@ class _Fit:
 
 
 def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
-    """The tones of a row, then the combinations that a cubic spring makes of them beside each."""
-    own = [float(omega), *tones]
+    """The tones of a row, then the combinations that a cubic spring makes of them beside each; none where it rests."""
+    own = [float(omega), *tones] if omega else []
     return own + sorted({2 * one - other for one in own for other in own} - set(own))
 
 

@@ -63,6 +63,7 @@ from .outlook import (
     spread_words as spread_words,
 )
 from .plan import (
+    AMPLITUDE_ERROR_LIMIT as AMPLITUDE_ERROR_LIMIT,
     FramePlan as FramePlan,
     Plan as Plan,
     Ramp as Ramp,

@@ -18,7 +18,7 @@ from .plan import Ramp
 
 __all__ = ["PLANS_VERSION", "PlanCache", "cache_path"]
 
-PLANS_VERSION = 1
+PLANS_VERSION = 2
 """One more whenever planning, or the simulator under it, gives other numbers: what was kept before is not found."""
 
 # How long another process may write before the cache is not waited for.

@@ -258,7 +258,8 @@ def full_motion(
     ----------
     force : float64, shape (S, P), on the first actuator of each at samples every `dtau`.
     lam : float64, shape (n,) or one that fits (S, P, n), the links; the first closes a ring and is 0 otherwise.
-    before : forces on every actuator ahead of these, float64, shape (Q, P, n), and the links under them, shape (n,).
+    before : forces on every actuator ahead of these, float64, shape (Q, P, n), and the links under them, shape (n,) or
+        (P, n).
 
     Returns
     -------

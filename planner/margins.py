@@ -1,8 +1,6 @@
-"""How far a vibration stays from what it must not reach, and what the converter's steps do to it."""
+"""How far a vibration stays from what it must not reach, and what the noise of its amplifier does to it."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +10,7 @@ from chainsim import Closure, Device, Response
 from .closed_forms.links import stages
 from .operating_point import Margins, OperatingPoint
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["WELL_SHARE", "converter_error", "lacking_of", "slew_of", "well_of"]
+__all__ = ["WELL_SHARE", "lacking_of", "noise_error", "slew_of", "well_of"]
 
 Floats = NDArray[np.float64]
 
@@ -47,14 +42,16 @@ def lacking_of(margins: Margins) -> str:
     return ""
 
 
-def converter_error(device: Device, point: OperatingPoint) -> float:
-    """Standard deviation of the worst actuator's amplitude under the rounding of a converter, dimensionless.
+def noise_error(device: Device, point: OperatingPoint) -> float:
+    """Standard deviation of the worst actuator's amplitude under the noise of the amplifier, dimensionless.
 
-    Rounding adds noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error
-    feedback, `drivers.Waveform`); small motions pass it on stage by stage.
+    That is what its converter rounds, and what it adds itself (`surroundings.amplifier_noise`), spread evenly. Rounding
+    adds noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error feedback,
+    `drivers.Waveform`). Small motions pass both on stage by stage.
     """
     step = device.amplifier.volt_step * device.epsilon_per_volt
-    if not step:
+    added = 0.0 if device.surroundings is None else device.surroundings.amplifier_noise * device.epsilon_max
+    if not (step or added):
         return 0.0
     lam = np.concatenate([[0.0], point.lam])
     if device.coupling.closure is Closure.RING:
@@ -69,5 +66,5 @@ def converter_error(device: Device, point: OperatingPoint) -> float:
     if device.coupling.closure is Closure.RING:
         gain = gain / np.abs(1 - np.prod(lam[:, None] / stage, axis=0)) ** 2
     rate = device.amplifier.rate_hz / device.tau_per_s
-    density = step**2 / 12 / (np.pi * rate) * (2 * np.sin(omega / rate / 2)) ** 4
+    density = (step**2 / 12 * (2 * np.sin(omega / rate / 2)) ** 4 + added**2) / (np.pi * rate)
     return float(np.sqrt(np.trapezoid(density * gain, omega, axis=1).max()))

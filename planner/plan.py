@@ -18,10 +18,13 @@ from .wish import FrameWish
 if TYPE_CHECKING:
     from .outlook import FrameSpread
 
-__all__ = ["FramePlan", "Plan", "Ramp", "ToneRamp"]
+__all__ = ["AMPLITUDE_ERROR_LIMIT", "FramePlan", "Plan", "Ramp", "ToneRamp"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+AMPLITUDE_ERROR_LIMIT = 0.02
+"""Largest deviation of an amplitude that is right, in units of full scale."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,8 @@ class Ramp:
     lam : float64, shape (L, n-1), the links. None when they jump to the new state's values at the start of the frame.
     lacking : one clause on what the device lacks for this way, empty when it can go it.
     tones : envelopes at other frequencies, which add to the drive.
+    residue : float64, shape (2, 2n): how far the chain's positions and velocities (in tau) are at the end of the ramp
+        from the motion it leads to, when it began at phase 0 of the carrier and at pi/2; None where that is not known.
     """
 
     t_s: Floats
@@ -67,6 +72,7 @@ class Ramp:
     lam: Floats | None = None
     lacking: str = ""
     tones: tuple[ToneRamp, ...] = ()
+    residue: Floats | None = None
 
     @property
     def duration_s(self) -> float:
@@ -82,6 +88,7 @@ class FramePlan:
     means the chain already stands. `frame` is None for the way out after the last frame.
     `note` is one sentence when the outcome is not ok. `spread` is what the frame becomes under the device's spread,
     where it has one and the frame can be made. `contrast_db` is what was asked for, None where nothing was.
+    `residue` is the largest deviation that changes leave while the pattern stands, in units of full scale.
 
     Examples
     --------
@@ -107,6 +114,7 @@ class FramePlan:
     note: str = ""
     spread: FrameSpread | None = None
     contrast_db: float | None = None
+    residue: float = 0.0
 
     def __repr__(self) -> str:
         times = f"{self.start_s:.3f} to {self.end_s:.3f} s, settled at {self.settled_s:.3f} s"
@@ -120,7 +128,7 @@ class FramePlan:
     @property
     def error(self) -> float:
         """Predicted worst deviation of any actuator from what is aimed at, in units of full scale."""
-        return max(state.error for state in self.states)
+        return max(state.error for state in self.states) + self.residue
 
 
 @dataclass(frozen=True)

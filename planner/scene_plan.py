@@ -15,12 +15,13 @@ from .errors import ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
 from .frame_change import Change, change_to
 from .means import Means
 from .operating_point import OperatingPoint
-from .plan import FramePlan, Plan
+from .plan import AMPLITUDE_ERROR_LIMIT, FramePlan, Plan
 from .targets import AmplitudeTarget
 from .unequal import memory_of
 from .wish import FrameWish
 
 if TYPE_CHECKING:
+    from .following import Following
     from .robustness.expected import Expectation
 
 __all__ = ["DEFAULT_CONTRAST_DB", "kept_share", "plan_scene"]
@@ -83,6 +84,7 @@ class _Frames:
         self._scene, self._device = scene, device
         self._asked_db, self._wanted = asked_db, wanted
         self._planned_db = DEFAULT_CONTRAST_DB if asked_db is None else asked_db
+        self._following: Following | None = None
 
     @cached_property
     def _expected(self) -> Expectation | None:
@@ -107,6 +109,7 @@ class _Frames:
         rate = self._device.amplifier.rate_hz
         targets = memory.at_rest
         position = 0
+        self._following = None
         for frame in self._scene.frames:
             change = means.change(targets, frame)
             # What cannot be held is not played, and the next frame begins at rest.
@@ -114,6 +117,8 @@ class _Frames:
             targets = change.targets if played else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
+            if not played and self._following is not None:
+                self._following.rest()
             position += samples
         change = change_to(memory, targets, memory.at_rest)
         if any(ramp is not None for ramp in change.ramps):
@@ -130,12 +135,26 @@ class _Frames:
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
         times = start_s, start_s + longest, end_s
-        whole = self._judged(FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db))
+        residue = self._left(change, start_s, longest, end_s - start_s)
+        whole = self._judged(
+            FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue)
+        )
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
         wish = FrameWish.of(frame, self._asked_db)
         found = self._expected.of(change.targets, change.states, wish)
         return replace(whole, spread=found and replace(found, tried=self.means.tried))
+
+    def _left(self, change: Change, start_s: float, settled_s: float, length_s: float) -> float:
+        """What changes leave that is felt in a frame, in units of full scale."""
+        if self._following is None:
+            if all(ramp is None or ramp.residue is None for ramp in change.ramps):
+                return 0.0
+            from .following import Following
+
+            self._following = Following(self._device)
+        moments = (self._device.tau_per_s * at_s for at_s in (start_s, settled_s, length_s - settled_s))
+        return self._following.through(change.states, change.ramps, *moments)
 
     def _judged(self, plan: FramePlan) -> FramePlan:
         for state in plan.states:
@@ -145,6 +164,13 @@ class _Frames:
             if ramp is not None and ramp.lacking:
                 note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
+        if plan.frame is not None and plan.residue > AMPLITUDE_ERROR_LIMIT:
+            note = (
+                f"{self._device.name} cannot change to this pattern: what changes leave rings on at "
+                f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
+                "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+            )
+            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
         return plan
 
     def _note(self, state: OperatingPoint) -> str:

@@ -18,7 +18,7 @@ from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
 
-__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+__all__ = ["Amplifier", "Coupling", "Device", "DeviceSurroundings", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
@@ -92,6 +92,16 @@ class Amplifier(_Part):
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
+class DeviceSurroundings(_Part):
+    """What acts on a device beside what it is made of and told to do; what is left out is nothing.
+
+    `amplifier_noise` is the root mean square of what an amplifier adds to its output, spread evenly up to half of
+    `rate_hz`, as a share of its `volts`.
+    """
+
+    amplifier_noise: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
+
+
 class Note(_Part):
     """Where a value of the profile comes from."""
 
@@ -128,7 +138,8 @@ class Device(_Part):
     bias : whether every actuator has its own DC bias channel.
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
-        lam: 0.0}`` (relative standard deviations). Plans are then made for many such devices. None: they are as they say.
+        lam: 0.0}`` (relative standard deviations); plans are then made for many such devices. None: none is known.
+    surroundings : what acts on it besides, ``{amplifier_noise: 1.0e-5}``; plans count it as error. None: nothing does.
     notes : field name -> where the value comes from.
 
     Examples
@@ -162,6 +173,7 @@ class Device(_Part):
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
+    surroundings: DeviceSurroundings | None = None
     notes: dict[str, Note] = {}
 
     @model_validator(mode="after")
@@ -291,7 +303,7 @@ class Device(_Part):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        left_out = {"spread"} if self.spread is None else set()
+        left_out = {name for name in ("spread", "surroundings") if getattr(self, name) is None}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)
 
 

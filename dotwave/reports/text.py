@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planner import CONTRAST_LIMIT_DB, FrameWish
+from planner import AMPLITUDE_ERROR_LIMIT, CONTRAST_LIMIT_DB, FrameWish
 
 from ..plain import one_line
 from .report import Report, margin_lines, outcome_lines, plain
 
 __all__ = [
-    "AMPLITUDE_ERROR_LIMIT",
     "FrameCheck",
     "TextReport",
     "VerifyReport",
@@ -27,9 +26,6 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-
-AMPLITUDE_ERROR_LIMIT = 0.02
-"""Largest deviation from what is aimed at, in units of full scale."""
 
 LISTED = 20
 

@@ -37,9 +37,10 @@ def frame_note(mark: FrameMark) -> bytes:
     return _packed(
         {
             "start_s": mark.start_s, "settled_s": mark.settled_s, "end_s": mark.end_s,
-            "omega": mark.omega.tolist(), "target": mark.target.tolist(), "cells": mark.cells, "text": mark.text,
+            "moving": list(mark.moving), "omega": mark.omega.tolist(), "target": mark.target.tolist(),
             "wish": [[None if np.isnan(v) else v for v in row] for row in mark.wish.level.tolist()],
-            "outcome": mark.outcome.value, "page": mark.page, "span": list(mark.span),
+            "cells": mark.cells, "text": mark.text, "outcome": mark.outcome.value, "page": mark.page,
+            "span": list(mark.span),
             **({} if mark.wish.contrast_db is None else {"contrast_db": mark.wish.contrast_db}),
             **({"goes_on": [asdict(one) for one in mark.goes_on]} if mark.goes_on else {}),
         }

@@ -192,14 +192,19 @@ class _Fit:
         return grid
 
     def _omega(self) -> float:
-        omegas = set(self._manifest.frames[self._number].omega.tolist())
-        if len(omegas) > 1:
+        mark = self._manifest.frames[self._number]
+        if len(set(mark.omega[mark.omega > 0].tolist())) > 1:
             raise BoardRefusal(f"frame {self._number}: rows are driven at different frequencies; plan one for all")
-        return float(omegas.pop())
+        return _omega(mark)
+
+
+def _omega(mark: FrameMark) -> float:
+    """The frequency of those rows that move; f0 where none does."""
+    return float(mark.omega.max()) or 1.0
 
 
 def _tone(device: Device, number: int, mark: FrameMark, drive: Complexes) -> _Tone:
-    omega = float(mark.omega[0])
+    omega = _omega(mark)
     frequency = frequency_byte(omega * device.f0_hz)
     wanted = frequency * STEP_HZ / device.f0_hz
     stiff, stiff_there = (_stiffness(device, mark.target, w) for w in (omega, wanted))
@@ -246,7 +251,7 @@ def _frame(number: int, tone: _Tone, gain: int, ramp_s: float) -> BoardFrame:
 
 
 def _off_hz(device: Device, tone: _Tone) -> float:
-    return abs(tone.frequency * STEP_HZ - float(tone.mark.omega[0]) * device.f0_hz)
+    return abs(tone.frequency * STEP_HZ - _omega(tone.mark) * device.f0_hz)
 
 
 def _off_level(tone: _Tone, frame: BoardFrame, gain: int) -> float:

@@ -24,7 +24,7 @@ from .sampling import Waveform
 
 __all__ = ["WAVEFORMS_VERSION", "WrittenWaveform", "read_waveform", "write_waveform"]
 
-WAVEFORMS_VERSION = 1
+WAVEFORMS_VERSION = 2
 """One more whenever a plan gives other samples or another manifest: waveforms of icons are then written anew."""
 
 BLOCK = 4096

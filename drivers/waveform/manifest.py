@@ -45,11 +45,12 @@ class FrameMark:
     Attributes
     ----------
     start_s, settled_s, end_s : the pattern stands from settled_s to end_s.
-    omega : float64, shape (rows,), read-only, each row's drive frequency over f0.
+    omega : float64, shape (rows,), read-only, each row's drive frequency over f0; 0 where nothing moves (files from
+        before that was written: any).
     tones : further frequencies over f0 at which each row is to move as much; mostly none.
     phase : float64, shape (rows, cols), read-only, wanted phases in radians, NaN where any will do; those of rows
         with one omega may all be shifted alike.
-    moving : for each row whether its target is an amplitude at omega; else it is a deflection.
+    moving : for each row whether its target is an amplitude at omega; else what is felt is its mean.
     target : float64, shape (rows, cols), read-only, amplitude that is aimed at, in units of full scale.
     wish : what the scene asked for; of an old manifest the target.
     cells, text : what is shown, as Unicode Braille and as source text.
@@ -269,11 +270,16 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
     assert frame.wish is not None
     per_row = device.chains_per_row
     rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
+    places = [f"frame {number}, row {index}" for index in range(device.rows)]
+    moving = [_moving(row, place) for row, place in zip(rows, places, strict=True)]
     mark = {
         "start_s": frame.start_s,
         "settled_s": frame.settled_s,
         "end_s": frame.end_s,
-        "omega": [_common_omega(row, f"frame {number}, row {index}") for index, row in enumerate(rows)],
+        "moving": moving,
+        "omega": [
+            _common_omega(row, place) if moves else 0.0 for row, place, moves in zip(rows, places, moving, strict=True)
+        ],
         "target": [[_rounded(v) for state in row for v in state.target.tolist()] for row in rows],
         "wish": [[None if np.isnan(v) else _rounded(v) for v in row] for row in frame.wish.level.tolist()],
         "cells": frame.frame.cells,
@@ -290,15 +296,16 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):
         mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]
-    moving = [any(state.moving for state in row) for row in rows]
-    if device.bias == "actuator" and any(moving):
-        for index, row in enumerate(rows):
-            if moving[index] and any(np.any(state.bias) for state in row):
-                raise WaveformError(f"frame {number}, row {index}: some of its chains vibrate and some stand still")
-        mark["moving"] = moving
     if frame.spread is not None:
         mark["spread"] = frame.spread.as_dict()
     return mark
+
+
+def _moving(states: tuple[OperatingPoint, ...], place: str) -> bool:
+    moving = any(state.moving for state in states)
+    if moving and any(np.any(state.bias) for state in states):
+        raise WaveformError(f"{place}: some of its chains vibrate and some stand still")
+    return moving
 
 
 def _phases(state: OperatingPoint) -> list[float | None]:

@@ -30,6 +30,7 @@ MOST_HZ = 10_000_000
 MOST_SAMPLES = 1 << 60
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 # A length to hold to also makes sure that it is text which can be written: JSON can name half a character.
 Words = Annotated[str, Field(max_length=1_000_000)]
@@ -67,7 +68,7 @@ class _Frame(_Part):
     start_s: Seconds
     settled_s: Seconds
     end_s: Seconds
-    omega: list[Positive]
+    omega: list[NotNegative]
     target: list[list[Finite]]
     wish: list[list[Finite | None]] | None = None
     contrast_db: Positive | None = None
@@ -200,6 +201,9 @@ class _Check:
         for name, grid in (("wish", frame.wish), ("phase", frame.phase)):
             if grid is not None and (len(grid) != rows or any(len(row) != cols for row in grid)):
                 self._refuse(f"{place}.{name}", f"expected {rows} rows of {cols} numbers or null")
+        for row, (omega, moves) in enumerate(zip(frame.omega, _moving(frame, self._device), strict=True)):
+            if moves and not omega:
+                self._refuse(f"{place}.omega[{row}]", "expected a number above 0 where a row moves, got 0")
         if not frame.start_s <= frame.settled_s <= frame.end_s:
             times = f"start_s {frame.start_s}, settled_s {frame.settled_s}, end_s {frame.end_s}"
             self._refuse(place, f"{times} are not in order")
@@ -243,7 +247,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         span=(frame.span[0], frame.span[1]),
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
         phase=_frozen(_with_nan(frame.phase or any_phase)),
-        moving=tuple(frame.moving or [device.bias == "none"] * device.rows),
+        moving=_moving(frame, device),
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
     )
@@ -251,6 +255,11 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
 
 def _with_nan(rows: Sequence[Sequence[float | None]]) -> list[list[float]]:
     return [[math.nan if one is None else one for one in row] for row in rows]
+
+
+def _moving(frame: _Frame, device: Device) -> tuple[bool, ...]:
+    """Whether rows move: where a file from before that was written does not say it, all do, or all stand on a bias."""
+    return tuple([device.bias == "none"] * device.rows if frame.moving is None else frame.moving)
 
 
 def _frozen(values: ArrayLike) -> NDArray[np.float64]:

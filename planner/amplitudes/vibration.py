@@ -15,9 +15,9 @@ from chainsim import Device, Outcome
 
 from ..closed_forms.links import detuning_gain, links_for
 from ..family import AmplitudeFamily, PatternFamily
-from ..margins import WELL_SHARE, converter_error, lacking_of, slew_of
+from ..margins import WELL_SHARE, lacking_of, noise_error, slew_of
 from ..operating_point import Margins, OperatingPoint
-from ..plan import Ramp
+from ..plan import AMPLITUDE_ERROR_LIMIT, Ramp
 from ..targets import AmplitudeTarget, ChainTarget, DotGoal
 from ..transitions import jets
 from ..transitions.envelopes import ROUGHEST, EnvelopeRamp, change, fall, rise
@@ -105,7 +105,7 @@ class Vibration(AmplitudeFamily):
         for i in np.flatnonzero(np.any(aims != targets, axis=1)):
             if found[i].outcome is not Outcome.OK:
                 found[i] = self._exact(targets[[i]])[0]
-        return [self._rounded(state) for state in found]
+        return found
 
     def _aims(self, targets: Floats, goals: Sequence[DotGoal | None]) -> Floats:
         from ..robustness.robust_aim import aim_for
@@ -117,11 +117,6 @@ class Vibration(AmplitudeFamily):
         common = self.band.omega, whole.rows * whole.chains_per_row
         asked = zip(targets, goals, known, strict=True)
         return np.array([aim_for(self.device, one, *common, goal) if fine else one for one, goal, fine in asked])
-
-    def _rounded(self, state: OperatingPoint) -> OperatingPoint:
-        """With what the steps of a converter leave."""
-        noise = converter_error(self.device, state) if state.epsilon else 0.0
-        return replace(state, error=state.error + noise / self.device.full_scale)
 
     def _exact(self, targets: Floats) -> list[OperatingPoint]:
         chain, omega = self.device.chain, self.band.omega
@@ -160,7 +155,7 @@ class Vibration(AmplitudeFamily):
             noise_gain=float(gain),
             slew=slew_of(device, abs(found.epsilon[i]), self.band.omega),
         )
-        return OperatingPoint(
+        point = OperatingPoint(
             target=target,
             epsilon=complex(found.epsilon[i]),
             lam=found.lam[i],
@@ -168,15 +163,21 @@ class Vibration(AmplitudeFamily):
             omega=self.band.omega,
             phasor=found.phasor[i],
             mean=np.zeros(device.chain_length),
-            error=float(found.error[i]) / device.full_scale,
             margins=margins,
-            outcome=self._outcome(found.outcome[i], found.lam[i], margins),
-            lacking="" if self.band.lacking else lacking_of(margins),
+        )
+        noise = noise_error(device, point) / device.full_scale
+        lacking = lacking_of(margins)
+        if not lacking and noise > AMPLITUDE_ERROR_LIMIT:
+            lacking = f"its amplifier's noise makes it tremble by {100 * noise:.2g} %; it lacks a quieter amplifier"
+        return replace(
+            point,
+            error=float(found.error[i]) / device.full_scale + noise,
+            outcome=self._outcome(found.outcome[i], found.lam[i], lacking),
+            lacking="" if self.band.lacking else lacking,
         )
 
-    def _outcome(self, solved: Outcome, lam: Floats, margins: Margins) -> Outcome:
-        outside = self._outside(lam)
-        if solved is Outcome.OK and (self.band.lacking or outside or lacking_of(margins)):
+    def _outcome(self, solved: Outcome, lam: Floats, lacking: str) -> Outcome:
+        if solved is Outcome.OK and (self.band.lacking or self._outside(lam) or lacking):
             return Outcome.UNREACHABLE
         return solved
 
@@ -212,7 +213,22 @@ class Vibration(AmplitudeFamily):
         fill(resting & ~stopping, rise, band.rise_s, new)
         fill(stopping & ~resting, fall, band.ramp_s, old)
         fill(~resting & ~stopping, change, band.ramp_s, old, new)
-        return out
+        return self._known(before, after, out)
+
+    def _known(
+        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]
+    ) -> list[Ramp | None]:
+        """With what they leave, where they can be gone."""
+        from ..transitions.residue import residues_of
+
+        known = list(ramps)
+        gone = [(i, ramp) for i, ramp in enumerate(ramps) if ramp is not None and not ramp.lacking]
+        if gone:
+            ends = [before[i] for i, _ in gone], [after[i] for i, _ in gone]
+            found = residues_of(self.device, *ends, [ramp for _, ramp in gone])
+            for (i, ramp), residue in zip(gone, found, strict=True):
+                known[i] = replace(ramp, residue=residue)
+        return known
 
     def _ramps(
         self, made: EnvelopeRamp, ramp_s: float, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint]

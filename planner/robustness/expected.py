@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Closure, Device
 
 from ..closed_forms.links import drive_for, links_for
-from ..margins import converter_error
+from ..margins import noise_error
 from ..operating_point import OperatingPoint
 from ..outlook import FACTORS, FrameSpread, TradePoint, needed_for
 from ..targets import AmplitudeTarget, ChainTarget
@@ -250,7 +250,7 @@ class Expectation:
         ring = None if device.coupling.closure is Closure.OPEN else centre_of(device, places)
         motion = motion_of(set_to, parts, ring)
         report = judge(frame_target(device, there), motion, tolerance=TOLERANCE, threshold=THRESHOLD)
-        noise = max(converter_error(device, one) for one in there) / device.full_scale
+        noise = max(noise_error(device, one) for one in there) / device.full_scale
         level = np.where(motion.escaped, np.nan, np.abs(motion.phasor) / device.full_scale).astype(np.float32)
         return _Drawn((report.error + noise).astype(np.float32), report.right, level, noise)
 

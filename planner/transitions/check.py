@@ -85,6 +85,11 @@ class Orbit:
         factor = np.exp(1j * angle * np.arange(1, len(self.harmonics) + 1))
         return Orbit(np.asarray(self.harmonics * factor[:, None]), self.lam, self.omega)
 
+    def at(self, tau: Floats) -> Floats:
+        """Positions at instants `tau`: float64, shape (len(tau), n)."""
+        rate = 1j * self.omega * np.arange(1, len(self.harmonics) + 1)
+        return np.asarray((np.exp(np.multiply.outer(tau, rate)) @ self.harmonics).real)
+
     def prelude(self, chain: Chain, dtau: float, phase: float) -> Floats:
         """Forces on every actuator that lead from rest onto the orbit, up to one sample before its `phase`.
 
@@ -105,8 +110,8 @@ class Orbit:
         z, v, a = ((turning * rate**k @ self.harmonics).real for k in range(3))
         moved = step[:, None] * z
         force = (
-            step[:, None] * a + slope[:, None] * (2 * v + chain.delta * z) / length + bend[:, None] * z / length**2
-            + step[:, None] * chain.delta * v + moved + chain.beta * moved**3
+            step[:, None] * a + slope[:, None] * (2 * v + chain.deltas * z) / length + bend[:, None] * z / length**2
+            + step[:, None] * chain.deltas * v + chain.stiffness * moved + chain.betas * moved**3
         )  # fmt: skip
         force[:, 1:] -= self.lam * (moved[:, :-1] - moved[:, 1:])
         return np.asarray(force)

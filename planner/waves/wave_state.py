@@ -14,7 +14,7 @@ from ..closed_forms.links import detuning_gain
 from ..closed_forms.nearest import nearest_geometric
 from ..closed_forms.wave_fit import FittedPoint
 from ..family import RisingFamily
-from ..margins import converter_error, lacking_of, slew_of, well_of
+from ..margins import lacking_of, noise_error, slew_of, well_of
 from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
 from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
@@ -94,7 +94,7 @@ class _Told:
         task, device, point = self.task, self.task.device, self.found.point
         n, known = device.chain_length, bool(np.isfinite(self.found.error))
         phasor = self.found.phasor if known else np.zeros(n, dtype=np.complex128)
-        noise = converter_error(device, point) if known else 0.0
+        noise = noise_error(device, point) if known else 0.0
         error = task.wanted(1.0).error(phasor) + noise
         margins = self._margins() if known else Margins(0.0, 0.0)
         lacking = self._lacking(error, noise) or lacking_of(margins)
@@ -129,7 +129,11 @@ class _Told:
         task, found, scale = self.task, self.found, self.task.scale
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
-            return "" if small else f"the converter's steps leave {100 * noise / scale:.1g} % error; it lacks bits"
+            return (
+                ""
+                if small
+                else f"its amplifier's steps and noise leave {100 * noise / scale:.1g} % error; it lacks bits"
+            )
         if self._uneven():
             return self._no_freedom()
         if self.share < 1.0:

@@ -12,7 +12,7 @@ from chainsim import Amplifier, Chain, Closure, Coupling, Device, Outcome, Setti
 from encoders import GridShape, PatternKind, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
 from planner import OperatingPoint
 from planner.closed_forms.wave_fit import Freedom, MotionTarget, fit, response_to
-from planner.margins import converter_error
+from planner.margins import noise_error
 from planner.targets import AmplitudeTarget, WalkingTarget, WaveTarget, targets_of
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.two_tones import MAIN, ORDERS, two_tones
@@ -115,7 +115,7 @@ def test_a_coarse_converter_is_said_to_be_one() -> None:
     assert state.lacking.endswith("it lacks bits")
 
 
-def test_the_converter_error_is_that_of_shaped_noise() -> None:
+def test_the_noise_error_is_that_of_shaped_noise() -> None:
     """One actuator: the variance of a resonator under a one-sided density S of noise there is pi S / (2 delta)."""
     amplifier = Amplifier(volts=100.0, slew_v_per_s=3e5, rate_hz=8000, bits=12)
     device = SINGLE.model_copy(update={"amplifier": amplifier})
@@ -123,9 +123,9 @@ def test_the_converter_error_is_that_of_shaped_noise() -> None:
     rate = amplifier.rate_hz / device.tau_per_s
     density = step**2 / 12 / (math.pi * rate) * (2 * math.sin(1 / rate / 2)) ** 4
     expected = math.sqrt(density * math.pi / (2 * device.delta))
-    found = converter_error(device, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0))
+    found = noise_error(device, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0))
     assert found == pytest.approx(expected, rel=0.05)
-    assert converter_error(SINGLE, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0)) == 0
+    assert noise_error(SINGLE, OperatingPoint(0.01 + 0j, np.zeros(0), 1.0)) == 0
 
 
 def narrowed(**changes: object) -> Device:
