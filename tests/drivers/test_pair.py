@@ -92,7 +92,7 @@ def test_the_manifest_has_the_keys_of_the_design(tmp_path: Path) -> None:
     assert data["channels"][6] == {"index": 6, "role": "bias", "row": 0, "col": 0, "volts_per_unit": 100.0}
     assert {"rows", "cols", "f0_hz", "delta", "beta", "full_scale"} <= set(data["device"])
     assert list(data["coupling"][0]) == ["t_s", "row", "lam", "ramp_s"]
-    keys = "start_s settled_s end_s omega target wish cells text outcome page span"
+    keys = "start_s settled_s end_s moving omega target wish cells text outcome page span"
     assert list(data["frames"][0]) == keys.split()
     assert "«0»" in (tmp_path / "x.json").read_text(encoding="utf-8")
 
