@@ -46,8 +46,16 @@ from .identification.calibration import (
     SweepError as SweepError,
     fit_chain as fit_chain,
 )
+from .identification.device_estimate import (
+    DeviceEstimate as DeviceEstimate,
+    EstimateError as EstimateError,
+)
 from .identification.measurement import (
     Measured as Measured,
+)
+from .identification.page_choice import (
+    PageChoice as PageChoice,
+    choose_pages as choose_pages,
 )
 from .operating_point import (
     Margins as Margins,
