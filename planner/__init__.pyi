@@ -56,6 +56,10 @@ from .identification.measurement import (
 from .identification.page_choice import (
     PageChoice as PageChoice,
     choose_pages as choose_pages,
+    expected_error as expected_error,
+)
+from .identification.stages import (
+    SensorNoise as SensorNoise,
 )
 from .operating_point import (
     Margins as Margins,

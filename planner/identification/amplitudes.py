@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .stages import EACH, LEAST_NOISE, ChainEstimate, ChainPage, whitened
+from .stages import EACH, ChainEstimate, ChainPage, SensorNoise, whitened
 
 __all__ = ["PAGES_KEPT", "fit_amplitudes"]
 
@@ -19,7 +19,7 @@ PAGES_KEPT = 8
 SMALL = 1e-6
 
 
-def fit_amplitudes(prior: ChainEstimate, pages: Sequence[ChainPage], noise: float) -> ChainEstimate:
+def fit_amplitudes(prior: ChainEstimate, pages: Sequence[ChainPage], noise: SensorNoise) -> ChainEstimate:
     """The likeliest numbers given what was known before any page, and the amplitudes of the last pages.
 
     The modulus of a stage's balance needs the amplitudes at both its ends alone: ``|k - omega^2 + (3/4) |A|^2 beta +
@@ -31,14 +31,12 @@ def fit_amplitudes(prior: ChainEstimate, pages: Sequence[ChainPage], noise: floa
     ----------
     prior : what was known before.
     pages : the last `PAGES_KEPT` of them count; phases are not looked at.
-    noise : standard deviation of a measured amplitude, relative.
     """
     from scipy.optimize import least_squares
 
-    balances = [_Balance(page) for page in pages[-PAGES_KEPT:]]
+    balances = [_Balance(page, noise) for page in pages[-PAGES_KEPT:]]
     free = np.flatnonzero(np.diag(prior.covariance) > 0)
     root = np.linalg.cholesky(prior.covariance[np.ix_(free, free)])
-    weight = 1 / np.hypot(noise, LEAST_NOISE)
 
     def at(y: Floats) -> Floats:
         # In standard deviations of what was known.
@@ -47,10 +45,10 @@ def fit_amplitudes(prior: ChainEstimate, pages: Sequence[ChainPage], noise: floa
         return x.reshape(-1, EACH)
 
     def residual(y: Floats) -> Floats:
-        return np.concatenate([*(weight * one.off(at(y)) for one in balances), y])
+        return np.concatenate([*(one.off(at(y)) for one in balances), y])
 
     def jacobian(y: Floats) -> Floats:
-        return np.concatenate([*(weight * one.slope(at(y))[:, free] @ root for one in balances), np.eye(len(free))])
+        return np.concatenate([*(one.slope(at(y))[:, free] @ root for one in balances), np.eye(len(free))])
 
     y = least_squares(residual, np.zeros(len(free)), jacobian, method="lm", xtol=SMALL).x
     slope = jacobian(y)
@@ -62,7 +60,8 @@ def fit_amplitudes(prior: ChainEstimate, pages: Sequence[ChainPage], noise: floa
 class _Balance:
     """The moduli of one page's balances, of the stages whose amplitudes are known at both ends."""
 
-    def __init__(self, page: ChainPage) -> None:
+    def __init__(self, page: ChainPage, noise: SensorNoise) -> None:
+        self._noise = noise.of(page.phasor)
         size = np.abs(page.phasor)
         self._omega, self._cubic = page.omega, 0.75 * size**2
         self._lam = np.append(0.0, page.lam)
@@ -73,7 +72,7 @@ class _Balance:
     def off(self, x: Floats) -> Floats:
         """Logarithms of the moduli over what was measured, put together; float64, shape (stages,)."""
         off = np.log(np.abs(self._balance(x)) / (x[:, 3] * self._force))
-        return np.asarray(whitened(off[self._known], self._known))
+        return np.asarray(whitened(off, self._known, self._noise))
 
     def slope(self, x: Floats) -> Floats:
         """Derivatives of `off`; float64, shape (stages, 4n)."""
@@ -83,7 +82,7 @@ class _Balance:
         own[:, 3] -= 1 / x[:, 3]
         along = np.zeros((n, n, EACH))
         along[np.arange(n), np.arange(n)] = own
-        return np.asarray(whitened(along.reshape(n, -1)[self._known], self._known))
+        return np.asarray(whitened(along.reshape(n, -1), self._known, self._noise))
 
     def _balance(self, x: Floats) -> NDArray[np.complex128]:
         stiffness, delta, beta, gain = x.T

@@ -17,7 +17,7 @@ from ..operating_point import OperatingPoint
 from ..robustness.spread import RelativeSpread, known_spread
 from .amplitudes import PAGES_KEPT, fit_amplitudes
 from .measurement import Measured
-from .stages import NUMBERS, ChainEstimate, ChainPage
+from .stages import NUMBERS, ChainEstimate, ChainPage, SensorNoise
 
 __all__ = ["DeviceEstimate", "EstimateError", "prior_spread"]
 
@@ -83,7 +83,7 @@ class DeviceEstimate:
         return cls(device, prior, prior, ((),) * len(prior))
 
     def after(
-        self, states: Sequence[OperatingPoint], measured: Measured, noise: float, *, phases: bool = True
+        self, states: Sequence[OperatingPoint], measured: Measured, noise: SensorNoise, *, phases: bool = True
     ) -> DeviceEstimate:
         """The estimate after one more page.
 
@@ -92,7 +92,6 @@ class DeviceEstimate:
         states : what every chain was set to, as the plan of the page has it. Chains at rest, held by a bias, or driven
             at several tones tell nothing here.
         measured : how the actuators moved.
-        noise : standard deviation of a measured phasor's real and imaginary part, relative to its modulus.
         phases : whether phases were measured; where they were not, the last pages are fitted together.
         """
         seen = self._seen(measured)
@@ -100,7 +99,7 @@ class DeviceEstimate:
         for number, (state, phasor) in enumerate(zip(states, seen, strict=True)):
             if not state.epsilon or state.tones:
                 continue
-            page = ChainPage(abs(state.epsilon), state.lam, state.omega, phasor)
+            page = ChainPage(abs(state.epsilon), state.lam, state.omega, phasor * np.exp(-1j * np.angle(state.epsilon)))
             if phases:
                 chains[number] = chains[number].after(page, noise)
             else:

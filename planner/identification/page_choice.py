@@ -14,9 +14,9 @@ from encoders import TargetPattern
 
 from ..memory import Memory
 from .device_estimate import DeviceEstimate, EstimateError
-from .stages import ChainEstimate, ChainPage
+from .stages import ChainEstimate, ChainPage, SensorNoise
 
-__all__ = ["MOST_PAGES", "PageChoice", "choose_pages"]
+__all__ = ["MOST_PAGES", "PageChoice", "choose_pages", "expected_error"]
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class PageChoice:
     expected: Floats
 
 
-def choose_pages(device: Device, noise: float, goal: float, *, contrast_db: float) -> PageChoice:
+def choose_pages(device: Device, noise: SensorNoise, goal: float, *, contrast_db: float) -> PageChoice:
     """Each next page is the one after which the expected error of all pages is least.
 
     It ends when that is `goal` or less, after `MOST_PAGES`, or when no page makes it less. It is worked out for the
@@ -48,7 +48,6 @@ def choose_pages(device: Device, noise: float, goal: float, *, contrast_db: floa
 
     Parameters
     ----------
-    noise : standard deviation of a measured phasor's real and imaginary part, relative to its modulus.
     goal : in units of full scale.
     contrast_db : as in `plan_scene`.
 
@@ -57,7 +56,7 @@ def choose_pages(device: Device, noise: float, goal: float, *, contrast_db: floa
     EstimateError
         When the device can make no page, or its chains are rings.
     """
-    alone = device.model_copy(update={"rows": 1, "cols": device.chain_length, "actuators": ()})
+    alone = _alone(device)
     (estimate,) = DeviceEstimate.of(alone).chains
     levels, pages = _candidates(alone, contrast_db)
     chosen, expected = list[int](), [_expected(estimate, pages, device.full_scale)]
@@ -71,6 +70,24 @@ def choose_pages(device: Device, noise: float, goal: float, *, contrast_db: floa
         expected.append(errors[best])
         estimate = after[best]
     return PageChoice(levels[chosen], np.array(expected))
+
+
+def expected_error(estimate: DeviceEstimate, *, contrast_db: float) -> float:
+    """The error expected of any page as far as the device is known: as `PageChoice.expected`, mean over chains too.
+
+    Raises
+    ------
+    EstimateError
+        When the device can make no page.
+    """
+    alone = _alone(estimate.device)
+    _, pages = _candidates(alone, contrast_db)
+    return float(np.mean([_expected(chain, pages, alone.full_scale) for chain in estimate.chains]))
+
+
+def _alone(device: Device) -> Device:
+    """One chain of the device, as the profile has it."""
+    return device.model_copy(update={"rows": 1, "cols": device.chain_length, "actuators": ()})
 
 
 def _candidates(device: Device, contrast_db: float) -> tuple[Floats, list[ChainPage]]:

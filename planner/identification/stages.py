@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EACH", "NUMBERS", "ChainEstimate", "ChainPage", "whitened"]
+__all__ = ["EACH", "NUMBERS", "ChainEstimate", "ChainPage", "SensorNoise", "whitened"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -19,6 +19,25 @@ EACH = len(NUMBERS)
 # Noise that is left to the balance of one harmonic even where nothing is measured wrongly, relative: it leaves out
 # about (beta a^2)^2/40.
 LEAST_NOISE = 1e-5
+
+
+class SensorNoise(NamedTuple):
+    """Standard deviations of the real and of the imaginary part of a measured phasor.
+
+    Attributes
+    ----------
+    relative : to its modulus.
+    absolute : dimensionless, as the phasor.
+    """
+
+    relative: float
+    absolute: float = 0.0
+
+    def of(self, phasor: Complexes) -> Floats:
+        """Both together, relative to each phasor; float64, of its shape."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            whole = np.hypot(max(self.relative, LEAST_NOISE), self.absolute / np.abs(phasor))
+        return np.asarray(whole)
 
 
 class ChainPage(NamedTuple):
@@ -84,14 +103,10 @@ class ChainEstimate:
         rate = np.cumsum(self._rates(page), axis=0).real
         return np.asarray(np.sqrt(np.einsum("mk,kl,ml->m", rate, self.covariance, rate)))
 
-    def after(self, page: ChainPage, noise: float) -> ChainEstimate:
+    def after(self, page: ChainPage, noise: SensorNoise) -> ChainEstimate:
         """The estimate after one more page.
 
         Actuators that did not move, or were not measured, or follow one that was not, stay as they are.
-
-        Parameters
-        ----------
-        noise : standard deviation of a measured phasor's real and imaginary part, relative to its modulus.
         """
         rates = self._rates(page)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -99,15 +114,14 @@ class ChainEstimate:
         known = np.isfinite(off) & np.isfinite(rates).all(axis=1)
         if not known.any():
             return self
-        rates, off = (whitened(part[known], known) for part in (rates, off[:, None]))
+        rates, off = (whitened(part, known, noise.of(page.phasor)) for part in (rates, off[:, None]))
         rows = np.concatenate([rates.real, rates.imag])
         spread = self.covariance @ rows.T
-        noise2 = noise**2 + LEAST_NOISE**2
-        gain = np.linalg.solve(rows @ spread + noise2 * np.eye(len(rows)), spread.T).T
+        gain = np.linalg.solve(rows @ spread + np.eye(len(rows)), spread.T).T
         # Joseph's form: it stays symmetric and positive.
         kept = np.eye(self.mean.size) - gain @ rows
         step = gain @ np.concatenate([off.real, off.imag])[:, 0]
-        covariance = kept @ self.covariance @ kept.T + noise2 * gain @ gain.T
+        covariance = kept @ self.covariance @ kept.T + gain @ gain.T
         return ChainEstimate(self.mean + step.reshape(self.mean.shape), covariance)
 
     def _rates(self, page: ChainPage) -> Complexes:
@@ -122,11 +136,17 @@ class ChainEstimate:
         return rates.reshape(n, -1)
 
 
-def whitened(values: NDArray[Any], known: NDArray[np.bool_]) -> NDArray[Any]:
-    """Balances of the stages that are `known` put together so that their noise is independent.
+def whitened(values: NDArray[Any], known: NDArray[np.bool_], noise: Floats) -> NDArray[Any]:
+    """Balances of the stages that are `known` put together so that each has a noise of its own, of 1.
 
     Relative to its force, a balance has the noise of its own phasor less that of the one before. Where all are known
     the sums along the chain have one each.
+
+    Parameters
+    ----------
+    values : shape (n, ...), relative to each stage's force.
+    noise : float64, shape (n,), of each phasor, relative.
     """
-    each = np.eye(len(known)) - np.eye(len(known), k=-1)
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(each[known] @ each[known].T), values))
+    # A phasor that was not measured is in no balance that is known.
+    each = (np.eye(len(known)) - np.eye(len(known), k=-1))[known] * np.where(np.isfinite(noise), noise, 0.0)
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(each @ each.T), values[known]))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chainsim import Device, load_device
 from encoders import TargetPattern
-from planner import DeviceEstimate, EstimateError, Measured, OperatingPoint, choose_pages
+from planner import DeviceEstimate, EstimateError, Measured, OperatingPoint, SensorNoise, choose_pages
 from planner.identification import page_choice
 from planner.identification.stages import ChainEstimate, ChainPage
 from planner.memory import Memory
@@ -56,7 +56,7 @@ def shown(
         measured = hidden.measured(states)
         if not phases:
             measured = Measured(0, measured.mean, np.abs(measured.harmonic) + 0j)
-        estimate = estimate.after(states, measured, max(hidden.noise, 1e-6), phases=phases)
+        estimate = estimate.after(states, measured, SensorNoise(hidden.noise), phases=phases)
         levels = levels if same else random_pages(rng, profile)
     return errors, estimate
 
@@ -122,7 +122,7 @@ def test_what_is_expected_is_what_comes() -> None:
         share = np.sqrt(np.mean(off**2, axis=0)) / np.mean(expected, axis=0)
         # Forty draws tell a standard deviation to 11 %; far off, large motions are not linear in the numbers.
         assert np.all((share > 0.6) & (share < 1.6)), (number, share)
-        estimate = estimate.after(states, hidden.measured(states), hidden.noise)
+        estimate = estimate.after(states, hidden.measured(states), SensorNoise(hidden.noise))
 
 
 def test_pages_at_two_frequencies_tell_stiffness_from_gain() -> None:
@@ -133,12 +133,12 @@ def test_pages_at_two_frequencies_tell_stiffness_from_gain() -> None:
     estimate, pages = DeviceEstimate.of(profile), ([1.0, 0, 1, 0, 1, 0], [0.0, 1, 0, 1, 0, 1], [1.0, 1, 0, 0, 1, 1])
     for page in pages:
         states = planned(profile, np.tile(page, (2, 1)))
-        estimate = estimate.after(states, hidden.measured(states), 1e-7)
+        estimate = estimate.after(states, hidden.measured(states), SensorNoise(0.0))
     assert hidden.errors(planned(estimate.corrected(), np.tile([0.0, 0, 1, 1, 0, 1], (2, 1)))).max() < 1e-3
     assert np.median(estimate.deviation[:, 0]) > 0.3 * estimate.prior[0].deviation[0, 0]
     for page in pages:
         states = planned(slower, np.tile(page, (2, 1)))
-        estimate = estimate.after(states, hidden.measured(states), 1e-7)
+        estimate = estimate.after(states, hidden.measured(states), SensorNoise(0.0))
     found, truth = estimate.corrected(), hidden.truth
     assert estimate.told[:, [0, 3]].all()
     for row in range(2):
@@ -183,10 +183,10 @@ def test_what_was_not_measured_stays_as_it_was() -> None:
     estimate, states = DeviceEstimate.of(profile), planned(profile, np.ones((1, 6)))
     phasor = hidden_of(profile).measured(states).harmonic.copy()
     phasor[2] = np.nan
-    after = estimate.after(states, Measured(0, np.zeros(6), phasor), 0.01)
+    after = estimate.after(states, Measured(0, np.zeros(6), phasor), SensorNoise(0.01))
     changed = np.any(after.mean != estimate.mean, axis=1)
     assert changed.tolist() == [True, True, False, False, True, True]
-    silent = estimate.after(planned(profile, np.zeros((1, 6))), Measured(0, np.zeros(6), phasor), 0.01)
+    silent = estimate.after(planned(profile, np.zeros((1, 6))), Measured(0, np.zeros(6), phasor), SensorNoise(0.01))
     np.testing.assert_array_equal(silent.mean, estimate.mean)
 
 
@@ -195,7 +195,7 @@ def test_a_dead_actuator_is_called_strange_and_stays_believable() -> None:
     estimate, states = DeviceEstimate.of(profile), planned(profile, np.ones((1, 6)))
     phasor = hidden_of(profile).measured(states).harmonic.copy()
     phasor[3] *= 0.05
-    after = estimate.after(states, Measured(0, np.zeros(6), phasor), 0.01)
+    after = estimate.after(states, Measured(0, np.zeros(6), phasor), SensorNoise(0.01))
     assert after.strange[3]
     assert not after.strange[[0, 1, 2, 5]].any()
     wide = estimate.prior[0].deviation
@@ -208,13 +208,15 @@ def test_rings_and_measurements_of_another_device_are_refused() -> None:
         DeviceEstimate.of(load_device("paper-6x6-ring"))
     states = planned(LINKED, np.ones((6, 6)))
     with pytest.raises(EstimateError, match="linked-6x6 has 36 actuators, 4 were measured; give its own profile"):
-        DeviceEstimate.of(LINKED).after(states, Measured(0, np.zeros(4), np.zeros(4, dtype=np.complex128)), 0.01)
+        DeviceEstimate.of(LINKED).after(
+            states, Measured(0, np.zeros(4), np.zeros(4, dtype=np.complex128)), SensorNoise(0.01)
+        )
     with pytest.raises(ValueError, match="one mean and one harmonic an actuator"):
         Measured(0, np.zeros(4), np.zeros(5, dtype=np.complex128))
 
 
 def test_pages_are_chosen_until_any_page_is_expected_to_be_right() -> None:
-    choice = choose_pages(LINKED, 0.01, 0.02, contrast_db=20.0)
+    choice = choose_pages(LINKED, SensorNoise(0.01), 0.02, contrast_db=20.0)
     assert len(choice.expected) == len(choice.levels) + 1
     assert choice.expected[0] > 0.3
     assert choice.expected[-1] <= 0.02 < choice.expected[-2]
@@ -227,7 +229,7 @@ def test_pages_are_chosen_until_any_page_is_expected_to_be_right() -> None:
     for _ in range(20):
         after = estimate
         for at in rng.integers(0, len(pages), len(choice.levels)):
-            after = after.after(pages[at], 0.01)
+            after = after.after(pages[at], SensorNoise(0.01))
         by_chance.append(page_choice._expected(after, pages, LINKED.full_scale))
     assert choice.expected[-1] < min(by_chance)
     # And what is expected comes: other pages are then right to about that.
@@ -235,22 +237,38 @@ def test_pages_are_chosen_until_any_page_is_expected_to_be_right() -> None:
     hidden, known = hidden_of(profile), DeviceEstimate.of(profile)
     for levels in choice.levels:
         states = planned(known.corrected(), np.tile(levels, (10, 1)))
-        known = known.after(states, hidden.measured(states), hidden.noise)
+        known = known.after(states, hidden.measured(states), SensorNoise(hidden.noise))
     others = [random_pages(np.random.default_rng(seed), profile) for seed in range(4)]
     assert np.mean([hidden.errors(planned(known.corrected(), levels)) for levels in others]) < 0.03
 
 
 def test_a_single_actuator_needs_one_page() -> None:
-    assert choose_pages(SINGLE, 0.01, 0.01, contrast_db=20.0).levels.tolist() == [[1.0]]
+    assert choose_pages(SINGLE, SensorNoise(0.01), 0.01, contrast_db=20.0).levels.tolist() == [[1.0]]
 
 
 def test_a_device_that_can_show_no_page_says_what_it_lacks() -> None:
     slow = LINKED.model_copy(update={"omega": LINKED.omega.model_copy(update={"min": 1.0, "max": 1.0})})
     with pytest.raises(EstimateError, match="linked-6x6 can show no page to be identified by: "):
-        choose_pages(slow, 0.01, 0.01, contrast_db=20.0)
+        choose_pages(slow, SensorNoise(0.01), 0.01, contrast_db=20.0)
 
 
 def test_a_stage_learns_nothing_where_it_does_not_move() -> None:
     estimate = ChainEstimate(np.array([[1.0, 5e-3, -1.0, 1.0]]), np.diag([4e-4, 1e-6, 1e-2, 1e-3]))
     page = ChainPage(0.01, np.empty(0), 1.3, np.zeros(1, dtype=np.complex128))
-    np.testing.assert_array_equal(estimate.after(page, 0.01).covariance, estimate.covariance)
+    np.testing.assert_array_equal(estimate.after(page, SensorNoise(0.01)).covariance, estimate.covariance)
+
+
+def test_a_sensor_whose_noise_is_the_same_everywhere_tells_less_of_idle_actuators() -> None:
+    profile = of_rows(LINKED, 20)
+    hidden = HiddenDevice(drawn(profile, 1, f0=0.01), 0.0, np.random.default_rng(2), floor=0.01)
+    levels, errors = random_pages(np.random.default_rng(3), profile), list[list[float]]()
+    for noise in (SensorNoise(0.0, 0.01 * profile.full_scale), SensorNoise(0.01)):
+        estimate = DeviceEstimate.of(profile)
+        errors.append([])
+        for _ in range(5):
+            states = planned(estimate.corrected(), levels)
+            estimate = estimate.after(states, hidden.measured(states), noise)
+            errors[-1].append(float(np.mean(hidden.errors(states))))
+    told, mistaken = errors
+    assert told[4] < 0.06
+    assert told[4] < 0.6 * mistaken[4]

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Actuator, Device, Outcome, Setting, balance_near
-from planner import Measured, OperatingPoint
+from chainsim import Actuator, AsBuilt, Device, Outcome, Setting, balance_near
+from drivers import Waveform
+from planner import FramePlan, Measured, OperatingPoint, Plan
 from planner.robustness.batch_march import BatchParts, march
 
 Complexes = NDArray[np.complex128]
@@ -34,11 +35,12 @@ def drawn(
 
 @dataclass(frozen=True)
 class HiddenDevice:
-    """What shows pages and is measured; `noise` of either part of a phasor, relative."""
+    """What shows pages and is measured; `noise` of either part of a phasor, relative, `floor` of full scale."""
 
     truth: Device
     noise: float
     rng: np.random.Generator
+    floor: float = 0.0
 
     def motion(self, states: Sequence[OperatingPoint]) -> Complexes:
         """First harmonics of every chain set to a state, shape (chains, n)."""
@@ -61,13 +63,66 @@ class HiddenDevice:
         return np.asarray(answer.phasor[0])
 
     def measured(self, states: Sequence[OperatingPoint], frame: int = 0) -> Measured:
-        """What a sensor says of a page, phases against the drive."""
-        seen = self.motion(states) * np.exp(-1j * np.angle([[state.epsilon] for state in states]))
+        """What a sensor says of a page."""
+        seen = self.motion(states)
         noise = self.rng.standard_normal(seen.shape) + 1j * self.rng.standard_normal(seen.shape)
-        seen = (seen * (1 + self.noise * noise)).ravel()
+        seen = (seen + (self.noise * seen + self.floor * self.truth.full_scale) * noise).ravel()
         return Measured(frame, np.zeros(len(seen)), seen)
 
     def errors(self, states: Sequence[OperatingPoint]) -> NDArray[np.float64]:
         """Largest deviation from the target of every chain, in units of full scale."""
         felt = np.abs(self.motion(states)) / self.truth.full_scale
         return np.abs(felt - np.array([state.target for state in states])).max(axis=1)
+
+
+@dataclass(frozen=True)
+class HiddenGrid:
+    """A line to a device whose chains are driven: the full equations under the samples of a plan.
+
+    Each frame is measured over the second half of the time its pattern stands; `noise` is relative.
+    """
+
+    truth: Device
+    noise: float
+    rng: np.random.Generator
+
+    def __call__(self, plan: Plan) -> list[Measured]:
+        """Play from rest and measure."""
+        device, frames = self.truth, list(plan.frames)
+        wave, built = Waveform.of(plan), AsBuilt(device)
+        volts = np.concatenate(list(wave.blocks(1 << 14)))
+        force = np.zeros((len(volts), device.rows, device.cols))
+        for channel in wave.channels:
+            place = channel.row, channel.col or 0
+            force[:, *place] += volts[:, channel.index] * built.drive_per_volt[place]
+        z = built.integrator(wave.rate_hz).advance(force, self._lam(frames, len(volts), wave.rate_hz) * built.lam_gain)
+        return [self._seen(number, frame, z, wave.rate_hz) for number, frame in enumerate(frames) if frame.frame]
+
+    def _lam(self, frames: Sequence[FramePlan], samples: int, rate_hz: int) -> NDArray[np.float64]:
+        """What the links are set to at every sample, float64, shape (S, rows, cols)."""
+        device = self.truth
+        lam, t_s = (
+            np.zeros((samples, device.rows * device.chains_per_row, device.chain_length)),
+            np.arange(samples) / rate_hz,
+        )
+        for frame in frames:
+            here = (t_s >= frame.start_s) & (t_s < frame.end_s)
+            for chain, (state, ramp) in enumerate(zip(frame.states, frame.ramps, strict=True)):
+                lam[here, chain, 1:] = state.lam
+                if ramp is not None and ramp.lam is not None and ramp.lam_t_s is not None:
+                    on_the_way = here & (t_s < frame.start_s + ramp.lam_t_s[-1])
+                    since_s = t_s[on_the_way] - frame.start_s
+                    course = [np.interp(since_s, ramp.lam_t_s, one) for one in ramp.lam.T]
+                    lam[on_the_way, chain, 1:] = np.stack(course, axis=1)
+        return lam.reshape(samples, device.rows, device.cols)
+
+    def _seen(self, number: int, frame: FramePlan, z: NDArray[np.float64], rate_hz: int) -> Measured:
+        device = self.truth
+        first, stop = round((frame.settled_s + frame.end_s) / 2 * rate_hz), round(frame.end_s * rate_hz)
+        tau = np.arange(first, stop) / rate_hz * device.tau_per_s
+        turning = np.exp(-1j * frame.states[0].omega * tau)
+        basis = np.stack([np.ones(len(tau)), turning.real, -turning.imag])
+        mean, real, imaginary = np.linalg.solve(basis @ basis.T, basis @ z[first:stop].reshape(len(tau), -1))
+        harmonic = real - 1j * imaginary
+        noise = self.rng.standard_normal(harmonic.shape) + 1j * self.rng.standard_normal(harmonic.shape)
+        return Measured(number, mean, harmonic * (1 + self.noise * noise))
