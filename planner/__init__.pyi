@@ -40,6 +40,9 @@ from .errors import (
     PlanError as PlanError,
     SceneDoesNotFit as SceneDoesNotFit,
 )
+from .identification.bias_estimate import (
+    BiasEstimate as BiasEstimate,
+)
 from .identification.calibration import (
     ChainFit as ChainFit,
     Sweep as Sweep,
