@@ -72,7 +72,7 @@ class HiddenDevice:
     def errors(self, states: Sequence[OperatingPoint]) -> NDArray[np.float64]:
         """Largest deviation from the target of every chain, in units of full scale."""
         felt = np.abs(self.motion(states)) / self.truth.full_scale
-        return np.abs(felt - np.array([state.target for state in states])).max(axis=1)
+        return np.asarray(np.abs(felt - np.array([state.target for state in states])).max(axis=1))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from dotwave.studies.tune import TuneReport, tune
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import EstimateError, Measured, Plan, plan_scene
 from tests.support.hidden_device import HiddenDevice, HiddenGrid, drawn
+
+if TYPE_CHECKING:
+    from tests.conftest import Ended
 
 LINKED = load_device("linked-6x6")
 TWO = LINKED.model_copy(update={"rows": 2})
@@ -151,7 +155,7 @@ def test_what_cannot_be_tuned_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_and_prints(
-    dotwave: Callable[..., object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    dotwave: Callable[..., Ended], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[tuple[str, int | None]] = []
     line = line_to(TWO)
