@@ -81,16 +81,24 @@ def tune(
     It PLAYS: every page stands for some seconds, behind the safety gate. The controller must measure what its actuators
     do. What was found stands in the section actuators, with 95 % confidence; what the pages do not tell is said. The
     exit code is 1, and nothing is written, when the last page is not felt as wanted or an actuator is not of the
-    profile's kind.
+    profile's kind. A device that holds its pages by a bias is looked at only, without --output: it says what a volt
+    makes, loop and creep, and how well pages are held once these are undone.
 
     \b
     Example:
       dotwave tune --port /dev/ttyACM0 --device linked-6x6 -o my-device.yaml
     """
+    from chainsim import load_device
+
     from ..playing.measuring import MeasuringPort
     from ..studies.tune import tune as run
+    from ..studies.tune_bias import tune_bias
 
-    report = run(device, MeasuringPort(port, baud), output, goal=goal, noise=noise, phases=not amplitudes)
+    line, profile = MeasuringPort(port, baud), load_device(device)
+    if profile.bias == "actuator" and output is None:
+        held = tune_bias(profile, line, noise=noise)
+        finish(held, as_json, ok=held.ok)
+    report = run(device, line, output, goal=goal, noise=noise, phases=not amplitudes)
     finish(report, as_json, ok=report.ok)
 
 

@@ -154,7 +154,10 @@ def tune(
     device = load_device(name)
     check_device_path(out)
     if device.bias == "actuator":
-        raise AppError(f"{name}: it holds its pages still by a bias, which tells nothing of vibrations; see calibrate")
+        raise AppError(
+            f"{name}: its pages are held by a bias, and a profile has no place for loops and creep; "
+            "leave out --output to look at them"
+        )
     sensed = SensorNoise(GAIN_NOISE, noise * device.full_scale)
     choice = choose_pages(device, sensed, goal, contrast_db=DEFAULT_CONTRAST_DB)
     estimate, pages, stopped = DeviceEstimate.of(device), list[TunedPage](), ""

@@ -65,8 +65,33 @@ class BiasEstimate:
         mean = np.zeros((count, size))
         mean[:, 0] = 1.0
         wide = np.array([BASE, *np.full(len(RADII), LOOP / np.sqrt(len(RADII))), CREEP])
-        radius = RADII * (device.full_scale + device.beta * device.full_scale**3)
-        return cls(device, mean, np.tile(np.diag(wide**2), (count, 1, 1)), BiasHistory.at_rest(count, radius))
+        covariance, rest = np.tile(np.diag(wide**2), (count, 1, 1)), BiasHistory.at_rest(count, np.zeros(0))
+        estimate = cls(device, mean, covariance, rest)
+        return replace(estimate, history=estimate._fresh)
+
+    @property
+    def full_force(self) -> float:
+        """What holds full scale by the profile."""
+        return self.device.full_scale + self.device.beta * self.device.full_scale**3
+
+    @property
+    def gain(self) -> Floats:
+        """What an actuator makes of the volts for full scale the first time, over the profile's; shape (actuators,)."""
+        full = np.full(len(self.mean), self.full_force)
+        return np.asarray(np.sum(self._fresh.terms(full, 0.0) * self.mean, axis=1) / full)
+
+    @property
+    def loop(self) -> Floats:
+        """How much wider the force is at half of full scale on the way down, over that of full scale; as `gain`."""
+        half, full = (np.full(len(self.mean), share * self.full_force) for share in (0.5, 1.0))
+        ways = self._fresh, self._fresh.after(full, 0.0)
+        up, down = (np.sum(way.terms(half, 0.0) * self.mean, axis=1) for way in ways)
+        return np.asarray((down - up) / full)
+
+    @property
+    def creep(self) -> Floats:
+        """Growth of a constant force's effect in a decade of time, over the force; shape (actuators,)."""
+        return np.asarray(self.mean[:, -1])
 
     def after(self, frame: FramePlan, measured: Measured | None, noise: SensorNoise) -> BiasEstimate:
         """The estimate once a frame is over, as it was set.
@@ -103,6 +128,10 @@ class BiasEstimate:
         A frame that would need more than the amplifier's volts is unreachable.
         """
         return replace(plan, frames=_Corrected(self, plan))
+
+    @property
+    def _fresh(self) -> BiasHistory:
+        return BiasHistory.at_rest(len(self.mean), RADII * self.full_force)
 
     def _stiffness(self, z: Floats) -> Floats:
         own = self._chains("stiffness") + 3 * self._chains("betas") * z**2

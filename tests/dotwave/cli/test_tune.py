@@ -15,14 +15,16 @@ import yaml
 from chainsim import Device, load_device
 from dotwave.errors import AppError
 from dotwave.studies.tune import TuneReport, tune
+from dotwave.studies.tune_bias import tune_bias
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import EstimateError, Measured, Plan, plan_scene
 from tests.support.hidden_device import HiddenDevice, HiddenGrid, drawn
+from tests.support.hidden_piezo import HiddenPiezo
 
 if TYPE_CHECKING:
     from tests.conftest import Ended
 
-LINKED = load_device("linked-6x6")
+LINKED, PAPER = load_device("linked-6x6"), load_device("paper-6x6")
 TWO = LINKED.model_copy(update={"rows": 2})
 
 
@@ -148,10 +150,37 @@ def test_what_cannot_be_tuned_is_refused(tmp_path: Path) -> None:
         tune(base, lambda plan: [], None, goal=0.02, noise=0.0)
     with pytest.raises(AppError, match=r"mine\.txt: a device profile ends in \.yaml; name it so"):
         tune(base, lambda plan: [], tmp_path / "mine.txt", goal=0.02, noise=0.0)
-    with pytest.raises(AppError, match="paper-6x6: it holds its pages still by a bias"):
+    with pytest.raises(
+        AppError, match=r"paper-6x6: its pages are held by a bias, .* leave out --output to look at them"
+    ):
         tune("paper-6x6", lambda plan: [], None, goal=0.02, noise=0.0)
+    with pytest.raises(AppError, match="paper-6x6: nothing was measured; its controller must sense its actuators"):
+        tune_bias(PAPER, lambda plan: [], noise=0.01)
     with pytest.raises(EstimateError, match="linked-6x6 has 12 actuators, 3 were measured; give its own profile"):
         tune(base, lambda plan: [Measured(0, np.zeros(3), np.ones(3, dtype=np.complex128))], None, goal=0.02, noise=0.0)
+
+
+def held(hidden: HiddenPiezo) -> Callable[[Plan], list[Measured]]:
+    """A line to actuators that a bias holds; the way out is no page."""
+
+    def measured(plan: Plan) -> list[Measured]:
+        felt = [(number, frame, hidden.shows(frame)) for number, frame in enumerate(plan.frames)]
+        return [hidden.measured(seen, number) for number, frame, seen in felt if frame.frame is not None]
+
+    return measured
+
+
+def test_a_biased_device_is_looked_at_and_made_good() -> None:
+    hidden = HiddenPiezo(PAPER, 2)
+    report = tune_bias(PAPER, held(hidden), noise=0.01)
+    assert report.ok
+    # Both as measured, with 1 % of noise: what is left is hardly more.
+    assert np.mean(report.blind) > 0.03
+    assert np.mean(report.corrected) < 0.0135
+    assert report.gain == pytest.approx(np.median(hidden.gain / hidden.stiffness) * 0.96, abs=0.02)
+    assert report.creep == pytest.approx(0.02, abs=0.01)
+    assert "shown again with what was learned: 1." in report.as_text()
+    assert not tune_bias(PAPER, held(HiddenPiezo(PAPER, 3, noise=0.1)), noise=0.01).ok
 
 
 def test_the_command_writes_and_prints(
@@ -177,9 +206,13 @@ def test_the_command_writes_and_prints(
     ended = dotwave("tune", "--port", "/dev/ttyX", "--device", base, "-o", tmp_path / "no.yaml")
     assert ended.code == 1
     assert not (tmp_path / "no.yaml").exists()
-    ended = dotwave("tune", "--port", "/dev/ttyX", "--device", "paper-6x6")
+    ended = dotwave("tune", "--port", "/dev/ttyX", "--device", "paper-6x6", "-o", tmp_path / "no.yaml")
     assert ended.code == 2
     assert ended.err.count("\n") == 1
+    line = held(HiddenPiezo(PAPER, 2))
+    ended = dotwave("tune", "--port", "/dev/ttyX", "--device", "paper-6x6", "--noise", "0.01", "--json")
+    assert ended.code == 0
+    assert json.loads(ended.out)["loop"] == pytest.approx(0.05, abs=0.02)
 
 
 def test_a_report_without_pages_is_not_ok() -> None:
