@@ -8,9 +8,12 @@ from tempfile import TemporaryDirectory
 from drivers import write_waveform
 from planner import Measured, Plan
 
+from ..errors import AppError
 from .play import play
 
 __all__ = ["MeasuringPort"]
+
+ATTEMPTS = 2
 
 
 class MeasuringPort:
@@ -26,10 +29,12 @@ class MeasuringPort:
         self._port, self._baud = port, baud
 
     def __call__(self, plan: Plan) -> list[Measured]:
-        """Play from rest to rest.
+        """Play from rest to rest; once more where no measurement came, for a line may lose it.
 
         Raises
         ------
+        AppError
+            When the output was held up on its way, which spoils what is measured.
         DriverError
             When the gate refuses, the hardware does not fit, or the line is lost.
         """
@@ -37,5 +42,10 @@ class MeasuringPort:
         with TemporaryDirectory(prefix="dotwave-tune-") as folder:
             path = Path(folder) / "page.wav"
             write_waveform(plan, path)
-            play(path, live=True, port=self._port, baud=self._baud, on_measured=found.append)
+            for _ in range(ATTEMPTS):
+                report = play(path, live=True, port=self._port, baud=self._baud, on_measured=found.append)
+                if found:
+                    break
+        if not found and not report.ok:
+            raise AppError(f"{self._port}: the output was held up, and nothing was measured; {' '.join(report.notes)}")
         return found

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +16,11 @@ import yaml
 
 from chainsim import Device, load_device
 from dotwave.errors import AppError
+from dotwave.playing.measuring import MeasuringPort
 from dotwave.studies.tune import TuneReport, tune
 from dotwave.studies.tune_bias import tune_bias
+from drivers import ControllerSpec, Emulator, read_plant
+from drivers.protocol.plant import true_factors
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import EstimateError, Measured, Plan, plan_scene
 from tests.support.hidden_device import HiddenDevice, HiddenGrid, drawn
@@ -103,6 +108,46 @@ def test_the_report_says_what_happened_and_what_is_not_known(tmp_path: Path) -> 
     assert plain["outcome"] == "ok"
     assert plain["told"]["beta"] == 0
     assert len(plain["pages"]) == len(report.pages)
+
+
+@contextmanager
+def emulated(device: Device, plant: Path, link: Path) -> Iterator[None]:
+    """A controller on actuators that are as `plant` says, until the block ends."""
+    spec = ControllerSpec.of(device, buffer_s=10.0, watchdog_s=30.0)
+    emulator, over = Emulator(device, spec, link=link, plant=read_plant(plant, device)), threading.Event()
+
+    def serve() -> None:
+        while not over.is_set():
+            emulator.step(0.002)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+        emulator.close()
+
+
+def test_a_device_is_tuned_over_a_port(tmp_path: Path) -> None:
+    """Through protocol, sensors and full equations; more damping than usual, so that pages need not stand for long."""
+    device = TWO.model_copy(update={"delta": 0.02})
+    plant, link = tmp_path / "plant.yaml", tmp_path / "port"
+    plant.write_text(
+        "schema: dotwave/plant/1\nseed: 3\nspread: {frequency: 0.01, damping: 0.05, lam: 0.02, force: 0.03}\n"
+        "sensors: {noise: 0.002}\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "mine.yaml"
+    with emulated(device, plant, link):
+        report = tune(profile(tmp_path, device), MeasuringPort(str(link)), out, goal=0.03, noise=0.002)
+    assert report.ok, report.as_text()
+    assert report.pages[-1].error < 0.02 < 0.1 < report.pages[0].error
+    true = true_factors(read_plant(plant, device), device)
+    found = load_device(str(out))
+    wanted = (true["frequency"].ravel() ** 2, [*found.chain_at(0).stiffness, *found.chain_at(1).stiffness])
+    assert np.corrcoef(*wanted)[0, 1] > 0.8
 
 
 def spoiled(line: Callable[[Plan], Sequence[Measured]], *factors: complex) -> Callable[[Plan], list[Measured]]:
