@@ -94,6 +94,7 @@ from .harmonic_balance.sensitivity import (
 from .model.calibrated import (
     Actuator as Actuator,
     ActuatorSpread as ActuatorSpread,
+    PlusMinus as PlusMinus,
 )
 from .model.device import (
     Amplifier as Amplifier,

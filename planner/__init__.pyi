@@ -41,14 +41,29 @@ from .errors import (
     SceneDoesNotFit as SceneDoesNotFit,
     YieldError as YieldError,
 )
+from .identification.bias_estimate import (
+    BiasEstimate as BiasEstimate,
+)
 from .identification.calibration import (
     ChainFit as ChainFit,
     Sweep as Sweep,
     SweepError as SweepError,
     fit_chain as fit_chain,
 )
+from .identification.device_estimate import (
+    DeviceEstimate as DeviceEstimate,
+    EstimateError as EstimateError,
+)
 from .identification.measurement import (
     Measured as Measured,
+)
+from .identification.page_choice import (
+    PageChoice as PageChoice,
+    choose_pages as choose_pages,
+    expected_error as expected_error,
+)
+from .identification.stages import (
+    SensorNoise as SensorNoise,
 )
 from .operating_point import (
     Margins as Margins,

@@ -65,6 +65,43 @@ def play(
     finish(report, as_json, ok=report.ok)
 
 
+@commands.command(short_help="Identify a device from the pages it shows.", rich_help_panel=PLAY)
+def tune(
+    port: Annotated[str, typer.Option("--port", "-p", help="Serial port; see `dotwave ports`.")],
+    device: Device = "linked-6x6",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The .yaml to write; none: look only.")] = None,
+    goal: Annotated[float, typer.Option(min=1e-3, max=0.5, help="Error to be expected of a page in the end.")] = 0.02,
+    noise: Annotated[float, typer.Option(min=0, max=0.5, help="Of a sensor; both are shares of full scale.")] = 0.002,
+    amplitudes: Annotated[bool, typer.Option("--amplitudes", help="The sensors tell no phases.")] = False,
+    baud: Annotated[int | None, typer.Option(min=300, help="Bits per second; default: the controller's own.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Show the pages that tell most of a device, correct it after each, and write a device file.
+
+    It PLAYS: every page stands for some seconds, behind the safety gate. The controller must measure what its actuators
+    do. What was found stands in the section actuators, with 95 % confidence; what the pages do not tell is said. The
+    exit code is 1, and nothing is written, when the last page is not felt as wanted or an actuator is not of the
+    profile's kind. A device that holds its pages by a bias is looked at only, without --output: it says what a volt
+    makes, loop and creep, and how well pages are held once these are undone.
+
+    \b
+    Example:
+      dotwave tune --port /dev/ttyACM0 --device linked-6x6 -o my-device.yaml
+    """
+    from chainsim import load_device
+
+    from ..playing.measuring import MeasuringPort
+    from ..studies.tune import tune as run
+    from ..studies.tune_bias import tune_bias
+
+    line, profile = MeasuringPort(port, baud), load_device(device)
+    if profile.bias == "actuator" and output is None:
+        held = tune_bias(profile, line, noise=noise)
+        finish(held, as_json, ok=held.ok)
+    report = run(device, line, output, goal=goal, noise=noise, phases=not amplitudes)
+    finish(report, as_json, ok=report.ok)
+
+
 @commands.command(short_help="List serial ports.", rich_help_panel=PLAY)
 def ports(as_json: Json = False) -> None:
     """List the serial ports of this machine.

@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from chainsim import (
+    Actuator,
     Amplifier,
     Coupling,
     Device,
@@ -85,7 +86,8 @@ class GridPart(Part):
 class DevicePart(Part):
     """A device: a profile's name or file as `base`, and what is different from it.
 
-    A grid with another number of columns keeps one chain a row where the base has that.
+    A grid with another number of columns keeps one chain a row where the base has that. `actuators` stand in the place
+    of those the base has.
     """
 
     base: FilePath = "paper-6x6"
@@ -103,6 +105,7 @@ class DevicePart(Part):
     coupling: Coupling | None = None
     bias: Literal["none", "actuator"] | None = None
     amplifier: Amplifier | None = None
+    actuators: tuple[Actuator, ...] | None = None
     spread: dict[str, float] | None = None
 
     short: ClassVar[str] = "base"

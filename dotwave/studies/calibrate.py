@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from chainsim import Closure, Device, Outcome, load_device
-from drivers import atomic_file, naming
 
 from ..errors import AppError
+from .device_file import check_device_path, rounded, write_device
 from .measured_sweeps import ChainPlace, read_sweeps
 
 if TYPE_CHECKING:
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["CalibrateReport", "FittedActuator", "calibrate"]
 
 CONFIDENCE = 0.95
-DIGITS = 7
 # A number whose interval reaches farther than this share of it is worth less than the profile's.
 WORTHWHILE = 0.25
 NUMBERS = ("f0_hz", "delta", "beta", "lam", "epsilon_per_volt")
@@ -55,10 +51,10 @@ class FittedActuator:
         """The actuator in a device profile, numbers that are not determined left out."""
         kept = [name for name in self.values if name not in self.left_out]
         found: dict[str, Any] = {"row": self.row, "col": self.col}
-        found |= {name: _rounded(self.values[name]) for name in kept}
+        found |= {name: rounded(self.values[name]) for name in kept}
         if "lam" in kept and lam_set is not None:
             found["lam_set"] = lam_set
-        return found | {"plus_minus": {name: _rounded(self.plus_minus[name]) for name in kept}}
+        return found | {"plus_minus": {name: rounded(self.plus_minus[name]) for name in kept}}
 
 
 @dataclass(frozen=True)
@@ -133,8 +129,7 @@ def calibrate(source: str, *, device: str, out: Path | None, lam_set: float | No
     profile = load_device(device)
     if profile.coupling.closure is not Closure.OPEN:
         raise AppError(f"{device}: its chains are {profile.coupling.closure}; only open chains are fitted")
-    if out is not None and out.suffix.lower() not in {".yaml", ".yml"}:
-        raise AppError(f"{out}: a device profile ends in .yaml; name it so")
+    check_device_path(out)
     if lam_set is not None and not 0 < lam_set < math.inf:
         raise AppError(f"lam {lam_set:g}: expected a number > 0; what were the links set to during the sweep?")
     found: list[FittedActuator] = []
@@ -148,7 +143,7 @@ def calibrate(source: str, *, device: str, out: Path | None, lam_set: float | No
         if fit.outcome is not Outcome.OK:
             failed.append(place)
     if out is not None and not failed:
-        _write(out, profile, [one.entry(lam_set) for one in found])
+        write_device(out, profile, [one.entry(lam_set) for one in found])
     return CalibrateReport(str(out) if out and not failed else "", profile.name, tuple(found), tuple(failed))
 
 
@@ -176,27 +171,3 @@ def _fitted(device: Device, place: ChainPlace, fit: ChainFit) -> list[FittedActu
             )
         )
     return out
-
-
-def _write(out: Path, device: Device, entries: Sequence[dict[str, Any]]) -> None:
-    """The profile with its actuators, one a line."""
-    profile = device.as_dict() | {"name": out.stem[:80]}
-    mine = {(entry["row"], entry["col"]) for entry in entries}
-    before = [_known(entry) for entry in profile.pop("actuators", [])]
-    others = [entry for entry in before if (entry["row"], entry["col"]) not in mine]
-    everyone = sorted([*entries, *others], key=lambda entry: (entry["row"], entry["col"]))
-    head = yaml.safe_dump(profile, sort_keys=False, allow_unicode=True, width=110)
-    lines = [yaml.safe_dump(e, sort_keys=False, default_flow_style=True, width=10_000).strip() for e in everyone]
-    text = head + "".join(["actuators:\n", *(f"  - {line}\n" for line in lines)])
-    with atomic_file(out) as file, naming(out):
-        file.write(text.encode())
-
-
-def _known(entry: dict[str, Any]) -> dict[str, Any]:
-    """An entry of a profile without what it leaves open."""
-    kept = {name: value for name, value in entry.items() if value is not None}
-    return kept | {"plus_minus": {n: v for n, v in (entry.get("plus_minus") or {}).items() if v is not None}}
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")

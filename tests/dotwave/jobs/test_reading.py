@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import dedent
 from typing import Any, get_args
 
 import jsonschema
@@ -63,6 +64,12 @@ WRONG = {
     ),
     "device: {full_scale: 5}\nsequence: [{pause_s: 1}]": "1: device: full_scale 5.0 is beyond the softening hilltop",
     "device: {chain_length: 4}\nsequence: [{pause_s: 1}]": "1: device: chain_length 4 does not divide cols 6",
+    "device: {base: linked-6x6, actuators: [{row: 9, col: 0}]}\nsequence: [{pause_s: 1}]": (
+        "1: device: actuators.0: row 9, col 0 is outside the grid of 6 x 6"
+    ),
+    "device:\n  actuators:\n    - {row: 0, col: 1, f0: 131}\nsequence: [{pause_s: 1}]": (
+        "3: device.actuators.0.f0: unknown key"
+    ),
     "sequence: {text: a}": "1: sequence: expected a list, got {'text': 'a'}",
     "sequence: [{texture: {levels: 3}}]": "1: sequence.0.texture.levels: expected a list, got 3",
     "device: {spread: [1]}\nsequence: [{pause_s: 1}]": "1: device.spread: expected keys and values, got [1]",
@@ -109,6 +116,34 @@ def test_what_its_base_makes_wrong_is_said_in_the_same_words(tmp_path: Path, dev
 def test_only_whole_numbers_count_actuators(tmp_path: Path, rows: str) -> None:
     with pytest.raises(ProfileError, match="expected a whole number from 1 to 1024, got "):
         read_job(written(tmp_path, f"device: {{grid: {{rows: {rows}}}}}\nsequence: [{{pause_s: 1}}]"))
+
+
+def test_an_inline_device_knows_its_actuators(tmp_path: Path) -> None:
+    text = """\
+        device:
+          base: linked-6x6
+          actuators:
+            - {row: 0, col: 0, f0_hz: 131.9, epsilon_per_volt: 2.1e-3, plus_minus: {f0_hz: 0.01}}
+            - {row: 0, col: 1, lam: 0.52, lam_set: 0.5}
+        sequence: [{pause_s: 1}]
+        """
+    device = read_job(written(tmp_path, dedent(text))).device.device(tmp_path)
+    assert device.chain_at(0).stiffness[0] == pytest.approx((131.9 / 133.13) ** 2)
+    assert device.lam_gain(0).tolist() == [1.04, 1.0, 1.0, 1.0, 1.0]
+    assert device.drive_per_volt(0) == 2.1e-3
+    assert device.actuators[0].plus_minus.f0_hz == 0.01
+    # They stand in the place of the base's own.
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(yaml.safe_dump(device.as_dict()), encoding="utf-8")
+    text = "device: {base: mine.yaml, actuators: [{row: 5, col: 5, delta: 6.0e-3}]}\nsequence: [{pause_s: 1}]"
+    again = read_job(written(tmp_path, text)).device.device(tmp_path)
+    assert [(one.row, one.col) for one in again.actuators] == [(5, 5)]
+    assert (
+        len(
+            read_job(written(tmp_path, "device: mine.yaml\nsequence: [{pause_s: 1}]")).device.device(tmp_path).actuators
+        )
+        == 2
+    )
 
 
 def test_an_inline_device_is_its_base_with_changes(tmp_path: Path) -> None:
