@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from encoders import Frame
 
 from .frame_change import Change, change_to
 from .memory import Memory
-from .outlook import MeansTried
 from .targets import AS_WISHED, ChainTarget, DotGoal
 from .wish import FrameWish
+
+if TYPE_CHECKING:
+    from .outlook import MeansTried
 
 __all__ = ["Means"]
 

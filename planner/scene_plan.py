@@ -14,10 +14,10 @@ from encoders import Frame, Scene
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
 from .frame_change import Change, change_to
 from .means import Means
+from .memory import Memory
 from .operating_point import OperatingPoint
 from .plan import AMPLITUDE_ERROR_LIMIT, FramePlan, Plan
 from .targets import AmplitudeTarget
-from .unequal import memory_of
 from .wish import FrameWish
 
 if TYPE_CHECKING:
@@ -102,7 +102,11 @@ class _Frames:
             from .robustness.means_search import means_for
 
             found = means_for(self._scene.frames, self._expected, self._planned_db, self._asked_db)
-        return found or Means(memory_of(self._device, self._planned_db))
+        if found is None and self._device.actuators:
+            from .unequal import memory_of
+
+            return Means(memory_of(self._device, self._planned_db))
+        return found or Means(Memory(self._device, self._planned_db))
 
     def __iter__(self) -> Iterator[FramePlan]:
         means, memory = self.means, self.means.memory

@@ -15,7 +15,6 @@ from encoders import Scene
 from planner import FramePlan, Plan, plan_scene
 
 from ..errors import AppError, NotMade
-from ..rendering.presenting import presented
 from ..rendering.render import render
 from ..reports.html import html_table
 from ..reports.report import Report
@@ -90,7 +89,10 @@ def plan(
     if device is None:
         raise AppError("plan: no device was given; give the one that the scene was laid out for")
     profile = device_of(device)
-    scene = presented(scene, profile, request).scene
+    if request.yield_ is not None:
+        from ..rendering.presenting import presented
+
+        scene = presented(scene, profile, request).scene
     found = plan_scene(scene, profile, contrast_db=request.contrast_db, yield_=request.yield_)
     return ScenePlan(profile, _Judged(found, scene, request), scene.encoding, scene, request)
 

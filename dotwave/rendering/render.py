@@ -21,7 +21,6 @@ from ..request import Request
 from ..scenes import placed
 from ..studies.judge import Judge
 from .extent import extent_of, go_on
-from .presenting import presented
 from .text_findings import text_findings
 
 __all__ = ["render"]
@@ -50,7 +49,11 @@ def render(scene: Scene, device: Device, out: Path | None = None, request: Reque
     """
     began = time.perf_counter()
     request = request or Request()
-    scene, shown = presented(scene, device, request)
+    shown: tuple[str, ...] = ()
+    if request.yield_ is not None:
+        from .presenting import presented
+
+        scene, shown = presented(scene, device, request)
     plan = plan_scene(scene, device, contrast_db=request.contrast_db, yield_=request.yield_)
     if out is not None and FORMATS[check_suffix(out)].sample_bytes:
         go_on(extent_of(scene.frames, device, out, request.encoding), out, yes=request.yes)
