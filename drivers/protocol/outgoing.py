@@ -152,10 +152,10 @@ def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     device, rate = manifest.device, manifest.rate_hz
     for number, mark in enumerate(manifest.frames):
         at, stop = round((mark.settled_s + mark.end_s) / 2 * rate), round(mark.end_s * rate)
-        turns = [
-            turns_of(omega, device.tau_per_s / rate) if moving else 0
-            for omega, moving in zip(mark.omega.tolist(), mark.moving, strict=True)
-        ]
+        # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
+        others = float(mark.omega.max()) if device.bias == "none" else 0.0
+        asked = [omega if moving else others for omega, moving in zip(mark.omega.tolist(), mark.moving, strict=True)]
+        turns = [turns_of(omega, device.tau_per_s / rate) if omega else 0 for omega in asked]
         while len(turns) > 1 and turns[-1] == turns[-2]:
             turns.pop()
         if stop > at and len(turns) <= Measure.most(found.max_payload):
