@@ -14,16 +14,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from ..choices import Undefined
 from ..errors import TableMissing
 from ..scene import GoesOn
 from . import louis_binding
 from .alphabet import alphabet
-from .choices import Undefined
 from .dots import BLANK, LOWER_SIX
 from .joining import join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
-from .transcribe import Transcriber, translate
+from .transcribe import Transcriber
+from .translation import translate
 from .undefined import writable
 
 __all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate", "covered_text"]

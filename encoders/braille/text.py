@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ..choices import Presentation, Undefined
 from ..errors import EmptyText, LayoutError
 from ..scene import Frame, GridShape, Scene, TargetPattern
 from . import louis_binding
 from .alphabet import alphabet
 from .back_check import BackCheck, FeltPage, back_check
-from .choices import Presentation, Undefined
 from .dots import BLANK, HIGHEST_6_DOT
 from .layout import Cut, Layout, PlacedWord, cut_anywhere, paginate
 from .presentation import MIN_PART_S, presenter, read_cells
