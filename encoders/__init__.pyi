@@ -4,13 +4,16 @@ from .braille.back_check import (
     FeltPage as FeltPage,
     back_check as back_check,
     back_translate as back_translate,
-    covered_text as covered_text,
 )
 from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,
 )
 from .braille.joining import (
+    covered_emphases as covered_emphases,
+    covered_text as covered_text,
+    emphases_of as emphases_of,
+    emphases_within as emphases_within,
     join_pages as join_pages,
 )
 from .braille.louis_binding import (
@@ -122,6 +125,7 @@ from .scene import (
     Frame as Frame,
     GoesOn as GoesOn,
     GridShape as GridShape,
+    Heading as Heading,
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,

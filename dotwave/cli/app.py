@@ -22,7 +22,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import Grade, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, Mathematics, Presentation, Undefined
 
 from ..errors import Terminated
 from .command import (
@@ -98,6 +98,14 @@ def text(
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
     share: Yield = None,
+    encoding: Annotated[str | None, typer.Option(help="Of the file's characters, such as cp1252.")] = None,
+    emphasis: Annotated[EmphasisChoice | None, typer.Option(help="Of documents, written or not.")] = None,
+    images: Annotated[ImageChoice | None, typer.Option(help="Of documents, as the words they bring or felt.")] = None,
+    math: Annotated[Mathematics | None, typer.Option(help="Formulas of documents, in Nemeth code or words.")] = None,
+    start_at: Annotated[
+        str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
+    ] = None,
+    pages: Annotated[str | None, typer.Option(help="Only these, such as 10-20; counted from --from.")] = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -109,9 +117,9 @@ def text(
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
 
-    TEXT|FILE|-: a path that exists is read as a file (UTF-8, Unicode Braille, or .brf), - is standard
-    input, anything else is the text itself. Words with a slash or a .txt suffix and no spaces are taken
-    for a path, and refused when there is no such file.
+    TEXT|FILE|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
+    HTML, EPUB, DAISY, DOCX, ODT, PDF), - is standard input, anything else is the text itself. Words with a
+    slash or the ending of a text and no spaces are taken for a path, and refused when there is no such file.
 
     \b
     Example:
@@ -130,9 +138,10 @@ def text(
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
         rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
+        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
     )  # fmt: skip
     profile = device_of(device)
-    report = render(text_scene(text_source(source), profile, options), profile, output, request)
+    report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)
 
 

@@ -35,7 +35,7 @@ def text_findings(scene: TextScene) -> TextFindings:
             for split in encoded.splits
         ),
         differences=differences,
-        notes=(sentence, *(more if encoded.split_total > len(encoded.splits) else ())),
+        notes=(*scene.text_frames.source.notes, sentence, *(more if encoded.split_total > len(encoded.splits) else ())),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import TableMissing
 from . import louis_binding
-from .choices import Grade
+from ..choices import Grade
 
 __all__ = ["TableInfo", "answer", "list_tables", "recommended_tables"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -155,7 +155,8 @@ class TextSource:
         except (OSError, ValueError) as error:
             raise UnsupportedSource(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
         _check_size(data, str(path))
-        return cls.of_bytes(data, str(path), suffix=suffix, encoding=encoding, math=math)
+        source = cls.of_bytes(data, str(path), suffix=suffix, encoding=encoding, math=math)
+        return replace(source, document=source.document and source.document.beside(path.parent))
 
     @classmethod
     def of_stream(
@@ -174,6 +175,24 @@ class TextSource:
             raise UnsupportedSource(f"{name}: cannot be read: {error.strerror or error}") from None
         _check_size(data, name)
         return cls.of_bytes(data, name, suffix=suffix, encoding=encoding, math=math)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on how it was read, for the person who reads it."""
+        return self.document.notes if self.document else ()
+
+    def part(self, start: int, end: int) -> TextSource:
+        """The characters from `start` to `end` as a source of their own; positions count from `start`.
+
+        Raises
+        ------
+        EmptyText
+            When there is nothing but white space.
+        """
+        text = self.text[start:end]
+        if not text.replace("\u2800", " ").strip():
+            raise EmptyText(f"{self.name}: there is nothing to show in characters {start} to {end}")
+        return replace(self, text=text, document=self.document and self.document.part(start, end), emphases=())
 
 
 def _check_size(data: bytes, name: str) -> None:
