@@ -63,6 +63,10 @@ def _without_commands() -> typer.Typer:
 app = _without_commands()
 
 GAP = "in actuators."
+Shown = Annotated[Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")]
+Start = Annotated[
+    str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
+]
 
 
 @app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
@@ -91,9 +95,7 @@ def text(
     line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
     rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
     dwell: Annotated[float | None, typer.Option(help="Seconds per page, instead of --rate.")] = None,
-    presentation: Annotated[
-        Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")
-    ] = None,
+    presentation: Shown = None,
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
@@ -102,9 +104,7 @@ def text(
     emphasis: Annotated[EmphasisChoice | None, typer.Option(help="Of documents, written or not.")] = None,
     images: Annotated[ImageChoice | None, typer.Option(help="Of documents, as the words they bring or felt.")] = None,
     math: Annotated[Mathematics | None, typer.Option(help="Formulas of documents, in Nemeth code or words.")] = None,
-    start_at: Annotated[
-        str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
-    ] = None,
+    start_at: Start = None,
     pages: Annotated[str | None, typer.Option(help="Only these, such as 10-20; counted from --from.")] = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
