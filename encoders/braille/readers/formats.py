@@ -110,10 +110,12 @@ def reader_of(data: bytes, suffix: str, name: str) -> Reader:
     """
     ending = [reader for reader in READERS if suffix in reader.suffixes]
     known = [reader for reader in (*ending, *READERS) if reader.knows(data)]
-    other = "" if known else _sniff(data)
+    # Packed otherwise than usual, but as it is called.
+    likely = [reader for reader in ending if data.startswith(reader.begins)]
+    other = "" if known or likely else _sniff(data)
     if other:
         raise UnsupportedSource(f"{name}: this is {other}; {_give()}")
-    return (*known, *ending, READERS[0])[0]
+    return (*known, *likely, *ending, READERS[0])[0]
 
 
 def _give() -> str:
