@@ -103,7 +103,7 @@ def _likely(encoding: str, char: str) -> float:
     if encoding == "cp1250":
         return 0.95 if char in "ąćęłńśźżčřšžýáíéúůěďťňőűĄĆĘŁŃŚŹŻČŘŠŽ„”–" else 0.1
     ranges = {
-        "shift_jis": (("\u3040", "\u30ff", 0.97), ("\u4e00", "\u9fff", 0.6)),
+        "shift_jis": (("\u3040", "\u30ff", 0.97), ("\u4e00", "\u9fff", 0.88)),
         "gb18030": (("\u4e00", "\u9fff", 0.85), ("\u3000", "\u3020", 0.8), ("\uff00", "\uff20", 0.8)),
         "big5": (("\u4e00", "\u9fff", 0.84), ("\u3000", "\u3020", 0.8)),
         "euc_kr": (("\uac00", "\ud7a3", 0.96),),
