@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from encoders import TextOptions, TextSource, text_suffixes
+from encoders import TextOptions, TextSource
 
 from .errors import AppError
 
@@ -63,7 +63,12 @@ def standard_input() -> BinaryIO:
 
 def _looks_like_path(argument: str) -> bool:
     spaced = any(character.isspace() for character in argument)
-    return not spaced and ("/" in argument or argument.lower().endswith(text_suffixes()))
+    if spaced or "/" in argument or "." not in argument:
+        return not spaced and "/" in argument
+    # Imported here: words without a point in them do without.
+    from encoders import text_suffixes
+
+    return argument.lower().endswith(text_suffixes())
 
 
 def simulation_source(argument: str) -> Path | Simulation:

@@ -11,10 +11,8 @@ from ...errors import InvalidText, UnsupportedSource
 if TYPE_CHECKING:
     from ...documents.model import Document
 
-__all__ = ["MAX_BYTES", "READERS", "Reader", "check_suffix", "reader_of", "text_suffixes"]
+__all__ = ["READERS", "Reader", "check_suffix", "reader_of", "text_suffixes"]
 
-# A thick book has some megabytes; one with pictures more.
-MAX_BYTES = 64_000_000
 HEAD = 256
 
 

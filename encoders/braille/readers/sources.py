@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from ...choices import Mathematics
 from ...errors import DocumentsMissing, EmptyText, InvalidText, UnsupportedSource
-from .formats import MAX_BYTES, check_suffix, reader_of
 
 if TYPE_CHECKING:
     from ...documents.flat import FlatDocument
     from ...documents.model import Document
 
 __all__ = ["SourceKind", "TextSource"]
+
+
+# A thick book has some megabytes; one with pictures more.
+MAX_BYTES = 64_000_000
 
 
 class SourceKind(StrEnum):
@@ -126,6 +129,8 @@ class TextSource:
         DocumentsMissing
             When a library that reads such files is not installed.
         """
+        from .formats import reader_of
+
         reader = reader_of(data, suffix, name)
         try:
             found = reader.read(data, encoding)
@@ -145,8 +150,9 @@ class TextSource:
         UnsupportedSource, InvalidText, EmptyText, DocumentsMissing
             As `of_bytes` does; also when the suffix says another kind, or the file cannot be read.
         """
-        # Imported here: words that are given as such do without.
+        # Imported here, as below: words that are given as such do without.
         from ...reading import first_bytes
+        from .formats import check_suffix
 
         suffix = path.suffix.lower()
         check_suffix(suffix, str(path))
