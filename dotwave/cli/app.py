@@ -63,6 +63,14 @@ def _without_commands() -> typer.Typer:
 app = _without_commands()
 
 GAP = "in actuators."
+Words = Annotated[
+    str,
+    typer.Argument(
+        metavar="TEXT|FILE|-",
+        help="A file if it exists, - for stdin, else words.",
+        autocompletion=completed_texts(),
+    ),
+]
 Shown = Annotated[Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")]
 Start = Annotated[
     str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
@@ -71,14 +79,7 @@ Start = Annotated[
 
 @app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
 def text(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="TEXT|FILE|-",
-            help="A file if it exists, - for stdin, else words.",
-            autocompletion=completed_texts(),
-        ),
-    ],
+    source: Words,
     device: Device = "paper-6x6",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
