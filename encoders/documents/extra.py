@@ -12,8 +12,8 @@ from ..errors import DocumentsMissing
 __all__ = ["STUMBLES", "extra"]
 
 STUMBLES = (
-    ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError,
-    SyntaxError, TypeError, ValueError, zipfile.BadZipFile, zlib.error,
+    ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, OSError, RuntimeError, TypeError,
+    ValueError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 """What a library that trusts its files raises of one that is broken, beside errors of its own."""
 

@@ -174,7 +174,7 @@ def test_a_job_has_the_same_choices(tmp_path: Path, dotwave) -> None:
     job.write_text("sequence:\n  - text: {file: book.txt, encoding: cp1252, from: aus, pages: 1}\n")
     ended = dotwave("render", job, "--json")
     assert ended.code == 0, ended.err
-    assert json.loads(ended.out)["parts"] == ["text: aus"] or "aus" in ended.out
+    assert json.loads(ended.out)["parts"] == ["text: aus"]
     job.write_text("sequence:\n  - text: {file: book.txt, encoding: klingon}\n")
     ended = dotwave("render", job)
     assert ended.code == 2

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -70,6 +71,27 @@ def docx_of_entities() -> bytes:
     return zipped({"word/document.xml": inside, "[Content_Types].xml": "<Types/>"})
 
 
+def pdf(packed: bytes = b"") -> bytes:
+    """A PDF of one page with two words on it, or what is packed in its place."""
+    stream = packed or b"BT /F1 12 Tf 72 700 Td (Hello there) Tj ET"
+    how = b"/Filter/FlateDecode" if packed else b""
+    objects = [
+        b"<</Type/Catalog/Pages 2 0 R>>", b"<</Type/Pages/Count 1/Kids[3 0 R]>>",
+        b"<</Type/Page/Parent 2 0 R/MediaBox[0 0 600 800]/Contents 4 0 R/Resources<</Font<</F1 5 0 R>>>>>>",
+        b"<</Length %d%s>>stream\n%s\nendstream" % (len(stream), how, stream),
+        b"<</Type/Font/Subtype/Type1/BaseFont/Helvetica>>",
+    ]  # fmt: skip
+    body, places = b"%PDF-1.4\n", []
+    for number, content in enumerate(objects, 1):
+        places.append(len(body))
+        body += b"%d 0 obj%s endobj\n" % (number, content)
+    table = b"".join(b"%010d 00000 n \n" % place for place in places)
+    return body + b"xref\n0 6\n0000000000 65535 f \n%strailer<</Root 1 0 R/Size 6>>\nstartxref\n%d\n%%%%EOF" % (
+        table,
+        len(body),
+    )
+
+
 @pytest.mark.parametrize(
     ("suffix", "data", "says"),
     [
@@ -97,6 +119,7 @@ def docx_of_entities() -> bytes:
         (".odt", zipped({"mimetype": "x"}), "'content.xml' is not in the archive"),
         (".pdf", b"%PDF-1.7 and no more", "not a whole PDF"),
         (".pdf", PDF_LOOP, "PDF"),
+        (".pdf", pdf(zlib.compress(b" " * 200_000_000, 9)), "PDF"),
         (".md", b"# a\xff", "not UTF-8 at byte 3"),
         (".zip", zipped({"a.opf": "<package/>"}), "no DAISY book"),
     ],
@@ -183,26 +206,6 @@ def seeds(folder: Path) -> dict[str, bytes]:
     for suffix in ("html", "epub", "docx", "odt"):
         found[f".{suffix}"] = by_pandoc(MASTER, folder, suffix).read_bytes()
     return found
-
-
-def pdf() -> bytes:
-    """A PDF of one page with a word on it."""
-    stream = b"BT /F1 12 Tf 72 700 Td (Hello there) Tj ET"
-    objects = [
-        b"<</Type/Catalog/Pages 2 0 R>>", b"<</Type/Pages/Count 1/Kids[3 0 R]>>",
-        b"<</Type/Page/Parent 2 0 R/MediaBox[0 0 600 800]/Contents 4 0 R/Resources<</Font<</F1 5 0 R>>>>>>",
-        b"<</Length %d>>stream\n%s\nendstream" % (len(stream), stream),
-        b"<</Type/Font/Subtype/Type1/BaseFont/Helvetica>>",
-    ]  # fmt: skip
-    body, places = b"%PDF-1.4\n", []
-    for number, content in enumerate(objects, 1):
-        places.append(len(body))
-        body += b"%d 0 obj%s endobj\n" % (number, content)
-    table = b"".join(b"%010d 00000 n \n" % place for place in places)
-    return body + b"xref\n0 6\n0000000000 65535 f \n%strailer<</Root 1 0 R/Size 6>>\nstartxref\n%d\n%%%%EOF" % (
-        table,
-        len(body),
-    )
 
 
 def complaint(data: bytes, name: str, suffix: str) -> str:
