@@ -275,3 +275,20 @@ def test_a_document_of_ones_own_is_encoded() -> None:
     assert not report.undefined
     with pytest.raises(EncodeError, match="the text is empty"):
         TextSource.of_document(Document(()))
+
+
+def test_reports_say_where_in_the_file_something_is(tmp_path: Path, dotwave) -> None:
+    book = tmp_path / "book.md"
+    book.write_text("# One\n\n\nsome \ue000 sign and internationalisation\n")
+    report = json.loads(dotwave("text", book, "-d", "linked-6x6", "--json").out)
+    assert "first at character 10 (line 4)" in report["undefined"][0]
+    assert any("(line 4), page" in one for one in report["split"])
+
+
+def test_a_layout_can_ask_what_stands_where() -> None:
+    document = TextSource.of_bytes(MASTER.encode(), "a.md", suffix=".md").document
+    assert document is not None
+    item = document.block_at(document.text.index("1. first") + 3)
+    assert item is not None
+    assert (item.kind, item.level, document.text[item.start : item.end]) == (BlockKind.LIST_ITEM, 1, "1. first")
+    assert document.block_at(item.end) is None
