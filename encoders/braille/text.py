@@ -149,6 +149,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
             return _frames_of(part, shape, options).page_spans()
 
         source = excerpt(source, options.start_at, options.pages, page_spans)
+        # What is chosen is chosen: the frames' source and options give the same frames again.
+        options = replace(options, start_at=None, pages=None)
     frames = _frames_of(source, shape, options)
     return TextScene(shape, frames, frames.encoding)
 

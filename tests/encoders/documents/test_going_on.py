@@ -124,6 +124,12 @@ def test_pages_are_those_of_the_whole() -> None:
     assert part.text_frames.check().cells_equal
 
 
+def test_source_and_options_of_frames_give_them_again() -> None:
+    frames = scene_of(MASTER, SMALL, start_at="The second", pages="2-3").text_frames
+    again = encode_text(frames.source, SMALL, frames.options)
+    assert [frame.cells for frame in again.frames] == [frame.cells for frame in frames]
+
+
 def test_a_page_that_begins_inside_a_word_begins_with_the_word() -> None:
     text = "internationalisation and more"
     for page in (2, 3):
