@@ -261,9 +261,9 @@ def test_images_are_words_or_pictures_by_choice(tmp_path: Path, dotwave) -> None
     picture.save(tmp_path / "disc.png")
     page = tmp_path / "page.html"
     page.write_text('<p>one</p><img src="disc.png" alt="a disc"><p>two</p><img src="gone.png" alt="lost"><p>three</p>')
-    words = dotwave("text", page, "-d", "linked-6x6", "--json")
+    words = dotwave("text", page, "-d", "paper-6x6", "--json")
     assert "a disc" in json.loads(words.out)["text"]
-    ended = dotwave("text", page, "-d", "linked-6x6", "--images", "picture", "--json")
+    ended = dotwave("text", page, "-d", "paper-6x6", "--images", "picture", "--json")
     assert ended.code == 0, ended.err
     kinds = [part.partition(":")[0] for part in json.loads(ended.out)["parts"]]
     assert kinds == ["text", "icon", "text", "image left out"]
