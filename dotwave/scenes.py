@@ -52,8 +52,10 @@ def shape_of(device: Device) -> GridShape:
 
 def text_scene(source: TextSource, shape: GridShape, options: TextOptions) -> TextScene:
     """A text; raises as `encoders.encode_text` does."""
-    words = source.text if len(source.text) <= LONGEST_WORDS else source.text[: LONGEST_WORDS - 3] + "..."
-    return replace(encode_text(source, shape, options), parts=(f"text: {words}",))
+    scene = encode_text(source, shape, options)
+    said = scene.text_frames.source.text.replace("\n", " ")
+    words = said if len(said) <= LONGEST_WORDS else said[: LONGEST_WORDS - 3] + "..."
+    return replace(scene, parts=(f"text: {words}",))
 
 
 def still_scene(pattern: TargetPattern, dwell_s: float, words: str) -> Scene:

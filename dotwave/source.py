@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from encoders import TextSource, text_suffixes
+from encoders import TextOptions, TextSource
 
 from .errors import AppError
 
@@ -21,8 +21,13 @@ STANDARD_INPUT = "standard input"
 MAX_CHAIN_BYTES = 4_000_000
 
 
-def text_source(argument: str) -> TextSource:
+def text_source(argument: str, options: TextOptions | None = None) -> TextSource:
     """`argument` as standard input (``-``), an existing file, or literal text.
+
+    Parameters
+    ----------
+    argument : as it was given.
+    options : their encoding and mathematics are for reading.
 
     Raises
     ------
@@ -31,12 +36,13 @@ def text_source(argument: str) -> TextSource:
     encoders.EncodeError
         When what it names is not text, is broken, or is empty.
     """
+    options = options or TextOptions()
     if argument == "-":
-        return TextSource.of_stream(standard_input(), STANDARD_INPUT)
+        return TextSource.of_stream(standard_input(), STANDARD_INPUT, encoding=options.encoding, math=options.math)
     if os.path.isdir(argument):
         raise AppError(f"{argument}: is a folder; name a text file, or pipe the words: {PIPE}")
     if os.path.exists(argument):
-        return TextSource.of_path(Path(argument))
+        return TextSource.of_path(Path(argument), encoding=options.encoding, math=options.math)
     if _looks_like_path(argument):
         raise AppError(f"{argument}: no such file; correct the path, or pipe the words: {PIPE}")
     return TextSource.of_text(argument)
@@ -57,7 +63,12 @@ def standard_input() -> BinaryIO:
 
 def _looks_like_path(argument: str) -> bool:
     spaced = any(character.isspace() for character in argument)
-    return not spaced and ("/" in argument or argument.lower().endswith(text_suffixes()))
+    if spaced or "/" in argument or "." not in argument:
+        return not spaced and "/" in argument
+    # Imported here: words without a point in them do without.
+    from encoders import text_suffixes
+
+    return argument.lower().endswith(text_suffixes())
 
 
 def simulation_source(argument: str) -> Path | Simulation:

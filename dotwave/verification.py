@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
-from encoders import FeltPage, back_check, covered_text, read_cells
+from encoders import FeltPage, back_check, covered_emphases, covered_text, emphases_of, emphases_within, read_cells
 
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
@@ -216,16 +216,19 @@ def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
 def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
     """Read the felt dots of each page as cells, and translate them back."""
     encoding = manifest.encoding
+    emphases = emphases_of(encoding)
     checks: list[FrameCheck] = []
     pages: list[FeltPage] = []
     marks = {mark.page: mark for mark in manifest.frames}
     for number, parts in groupby(report.frames, key=lambda check: check.page):
         together = list(parts)
         cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
-        pages.append(FeltPage(cells, marks[number].text, marks[number].goes_on))
+        mark = marks[number]
+        pages.append(FeltPage(cells, mark.text, mark.goes_on, emphases_within(emphases, *mark.span)))
         checks += [replace(check, felt_cells=cells) for check in together]
-    source = covered_text((mark.span, mark.text) for mark in manifest.frames)
-    check = back_check(pages, source, encoding)
+    shown = [(mark.span, mark.text) for mark in manifest.frames]
+    source = covered_text(shown)
+    check = back_check(pages, source, encoding, covered_emphases(shown, emphases))
     return replace(
         report,
         frames=tuple(checks),

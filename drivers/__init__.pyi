@@ -157,6 +157,7 @@ from .waveform.limits import (
 )
 from .waveform.manifest import (
     FrameMark as FrameMark,
+    HeadingMark as HeadingMark,
     Manifest as Manifest,
 )
 from .waveform.manifest_reader import (

@@ -4,18 +4,16 @@ from .braille.back_check import (
     FeltPage as FeltPage,
     back_check as back_check,
     back_translate as back_translate,
-    covered_text as covered_text,
-)
-from .braille.choices import (
-    Grade as Grade,
-    Presentation as Presentation,
-    Undefined as Undefined,
 )
 from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,
 )
 from .braille.joining import (
+    covered_emphases as covered_emphases,
+    covered_text as covered_text,
+    emphases_of as emphases_of,
+    emphases_within as emphases_within,
     join_pages as join_pages,
 )
 from .braille.louis_binding import (
@@ -58,11 +56,34 @@ from .braille.text import (
     TextScene as TextScene,
     encode_text as encode_text,
 )
-from .braille.transcribe import (
+from .braille.translation import (
     Translation as Translation,
     translate as translate,
 )
+from .choices import (
+    EmphasisChoice as EmphasisChoice,
+    Grade as Grade,
+    ImageChoice as ImageChoice,
+    Mathematics as Mathematics,
+    Presentation as Presentation,
+    Undefined as Undefined,
+)
+from .documents.flat import (
+    BlockSpan as BlockSpan,
+    FlatDocument as FlatDocument,
+    ImageSpan as ImageSpan,
+)
+from .documents.model import (
+    Block as Block,
+    BlockKind as BlockKind,
+    Document as Document,
+    DocumentPlace as DocumentPlace,
+    EmbeddedImage as EmbeddedImage,
+    Emphasis as Emphasis,
+    TextRun as TextRun,
+)
 from .errors import (
+    DocumentsMissing as DocumentsMissing,
     EmptyText as EmptyText,
     EncodeError as EncodeError,
     InvalidText as InvalidText,
@@ -104,6 +125,7 @@ from .scene import (
     Frame as Frame,
     GoesOn as GoesOn,
     GridShape as GridShape,
+    Heading as Heading,
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 __all__ = [
+    "DocumentsMissing",
     "EmptyText",
     "EncodeError",
     "InvalidText",
@@ -35,6 +36,13 @@ class LouisMissing(EncodeError, ImportError):
     """
 
 
+class DocumentsMissing(EncodeError, ImportError):
+    """A document cannot be read for want of a library, or a program, that reads such.
+
+    Examples: an EPUB without lxml; a formula without a converter of MathML.
+    """
+
+
 class TableMissing(EncodeError, LookupError):
     """A translation table cannot be used.
 
@@ -45,7 +53,7 @@ class TableMissing(EncodeError, LookupError):
 class UnsupportedSource(EncodeError, ValueError):
     """The input is of a kind that is not read.
 
-    Examples: a PDF, a Word document, a picture; UTF-16 text.
+    Examples: an old Office document, a picture; an archive that would fill the memory.
     """
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Frame", "GoesOn", "GridShape", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
+__all__ = ["Frame", "GoesOn", "GridShape", "Heading", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,20 @@ class GoesOn:
 
 
 @dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading of what is shown, to jump to.
+
+    Attributes
+    ----------
+    level : 1 for the title of a book or a part, 2 below that, and so on to 6.
+    text : its words, at most 200 characters.
+    """
+
+    level: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A pattern and how long it is shown.
 
@@ -98,6 +112,7 @@ class Frame:
     text : the span of source text it shows; `span` is its (start, end) in characters.
     cells : the page's cells as Unicode Braille, lines separated by a newline; empty when blank.
     goes_on : where words go on after a run of the page.
+    headings : of the source, that begin on the page; of its parts the first has them.
     """
 
     pattern: TargetPattern
@@ -107,6 +122,7 @@ class Frame:
     span: tuple[int, int] = (0, 0)
     cells: str = ""
     goes_on: tuple[GoesOn, ...] = ()
+    headings: tuple[Heading, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from chainsim import Device, complaint_of, load_device, words_of
-from encoders import Scene, TargetPattern, TextOptions, TextScene, TextSource
+from encoders import ImageChoice, Scene, TargetPattern, TextOptions, TextSource
 
 from ..errors import AppError
 from ..scenes import DeviceScene, shape_of, still_scene, text_scene
@@ -65,7 +65,7 @@ def text(
     device: AnyDevice = USUAL_DEVICE,
     options: TextOptions | None = None,
     **changes: Any,
-) -> TextScene:
+) -> Scene:
     """A text as Braille, page by page.
 
     The text is encoded as its frames are drawn; a long one is never held whole.
@@ -73,7 +73,8 @@ def text(
     Parameters
     ----------
     source : str, path or encoders.TextSource
-        The words themselves, or the path (`pathlib.Path`) of a text file: UTF-8, Unicode Braille or BRF.
+        The words themselves, or the path (`pathlib.Path`) of a text (UTF-8, UTF-16, Unicode Braille, BRF) or a document
+        (`encoders.READERS`).
     device : Device, name, file or mapping
         Whose grid the pages are laid out for, as `dotwave.device` takes it.
     options : encoders.TextOptions, optional
@@ -83,8 +84,9 @@ def text(
 
     Returns
     -------
-    encoders.TextScene
-        Iterate its `frames`; each has a `pattern`, `cells`, the `text` it shows and `dwell_s` in seconds.
+    encoders.Scene
+        Iterate its `frames`; each has a `pattern`, `cells`, the `text` it shows and `dwell_s` in seconds. It is an
+        `encoders.TextScene`, but where images are shown as pictures.
 
     Raises
     ------
@@ -99,8 +101,14 @@ def text(
     ['Hello', 'world']
     """
     profile = _device(device)
-    given = source if isinstance(source, TextSource) else _source(source)
-    return text_scene(given, shape_of(profile), replace(options or TextOptions(), **changes))
+    chosen = replace(options or TextOptions(), **changes)
+    given = source if isinstance(source, TextSource) else _source(source, chosen)
+    if chosen.images is ImageChoice.PICTURE:
+        # Imported here: a text without pictures does without what encodes them.
+        from ..documents import illustrated_scene
+
+        return illustrated_scene(given, profile, chosen)
+    return text_scene(given, shape_of(profile), chosen)
 
 
 def texture(
@@ -183,5 +191,7 @@ def _checked(model: type[Model], given: Mapping[str, Any], what: str) -> Model:
         raise AppError(f"{place}: {complaint.sentence}") from None
 
 
-def _source(source: str | PathLike[str]) -> TextSource:
-    return TextSource.of_text(source) if isinstance(source, str) else TextSource.of_path(Path(source))
+def _source(source: str | PathLike[str], options: TextOptions) -> TextSource:
+    if isinstance(source, str):
+        return TextSource.of_text(source)
+    return TextSource.of_path(Path(source), encoding=options.encoding, math=options.math)

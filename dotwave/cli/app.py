@@ -22,7 +22,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import Grade, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, Mathematics, Presentation, Undefined
 
 from ..errors import Terminated
 from .command import (
@@ -63,18 +63,23 @@ def _without_commands() -> typer.Typer:
 app = _without_commands()
 
 GAP = "in actuators."
+Words = Annotated[
+    str,
+    typer.Argument(
+        metavar="TEXT|FILE|-",
+        help="A file if it exists, - for stdin, else words.",
+        autocompletion=completed_texts(),
+    ),
+]
+Shown = Annotated[Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")]
+Start = Annotated[
+    str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
+]
 
 
 @app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
 def text(
-    source: Annotated[
-        str,
-        typer.Argument(
-            metavar="TEXT|FILE|-",
-            help="A file if it exists, - for stdin, else words.",
-            autocompletion=completed_texts(),
-        ),
-    ],
+    source: Words,
     device: Device = "paper-6x6",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
@@ -91,13 +96,17 @@ def text(
     line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
     rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
     dwell: Annotated[float | None, typer.Option(help="Seconds per page, instead of --rate.")] = None,
-    presentation: Annotated[
-        Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")
-    ] = None,
+    presentation: Shown = None,
     dots: Annotated[Dots | None, typer.Option(help="Dots per cell.")] = None,
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
     share: Yield = None,
+    encoding: Annotated[str | None, typer.Option(help="Of the file's characters, such as cp1252.")] = None,
+    emphasis: Annotated[EmphasisChoice | None, typer.Option(help="Of documents, written or not.")] = None,
+    images: Annotated[ImageChoice | None, typer.Option(help="Of documents, as the words they bring or felt.")] = None,
+    math: Annotated[Mathematics | None, typer.Option(help="Formulas of documents, in Nemeth code or words.")] = None,
+    start_at: Start = None,
+    pages: Annotated[str | None, typer.Option(help="Only these, such as 10-20; counted from --from.")] = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -109,9 +118,9 @@ def text(
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
 
-    TEXT|FILE|-: a path that exists is read as a file (UTF-8, Unicode Braille, or .brf), - is standard
-    input, anything else is the text itself. Words with a slash or a .txt suffix and no spaces are taken
-    for a path, and refused when there is no such file.
+    TEXT|FILE|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
+    HTML, EPUB, DAISY, DOCX, ODT, PDF), - is standard input, anything else is the text itself. Words with a
+    slash or the ending of a text and no spaces are taken for a path, and refused when there is no such file.
 
     \b
     Example:
@@ -130,9 +139,10 @@ def text(
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
         rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
+        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
     )  # fmt: skip
     profile = device_of(device)
-    report = render(text_scene(text_source(source), profile, options), profile, output, request)
+    report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)
 
 

@@ -30,7 +30,16 @@ from chainsim import (
     shown,
     words_of,
 )
-from encoders import PictureOptions, Presentation, Style, Undefined, picture_rules
+from encoders import (
+    EmphasisChoice,
+    ImageChoice,
+    Mathematics,
+    PictureOptions,
+    Presentation,
+    Style,
+    Undefined,
+    picture_rules,
+)
 
 from ..request import TOLERANCES
 from .paths import FilePath
@@ -168,6 +177,12 @@ class TextPart(Part):
     presentation: Presentation | None = None
     dots: Literal[6, 8] | None = None
     blank_between: bool = False
+    emphasis: EmphasisChoice | None = None
+    images: ImageChoice = ImageChoice.WORDS
+    math: Mathematics = Mathematics.NEMETH
+    encoding: str | None = None
+    start_at: Annotated[str | int | None, Field(alias="from")] = None
+    pages: str | int | None = None
 
     short: ClassVar[str] = "say"
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from chainsim import Device, Located, load_device
-from encoders import EncodeError, GridShape, Scene, Style, TargetPattern, TextOptions, TextSource
+from encoders import EncodeError, GridShape, ImageChoice, Scene, Style, TargetPattern, TextOptions, TextSource
 from planner import PlanError
 
+from ..documents import illustrated_scene
 from ..errors import AppError
 from ..pictures import picture_scene
 from ..request import Request
@@ -134,10 +135,14 @@ class _Item:
         given["presentation"] = part.presentation or self.job.presentation
         self.reach.table(part.table, self.at("table"))
         if part.file is not None:
-            source = TextSource.of_path(self.reach.file(part.file, self.at("file")))
+            path = self.reach.file(part.file, self.at("file"))
+            source = TextSource.of_path(path, encoding=part.encoding, math=part.math)
         else:
             source = TextSource.of_text(part.say or "")
-        return text_scene(source, self.shape, TextOptions(**given))
+        options = TextOptions(**given)
+        if options.images is ImageChoice.PICTURE:
+            return illustrated_scene(source, self.device, options)
+        return text_scene(source, self.shape, options)
 
     def _picture(self, part: PicturePart) -> Scene:
         path = self.reach.file(part.file, self.at("file"))

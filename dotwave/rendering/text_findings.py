@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from encoders import EncodingReport, TextFrames, TextScene
+from encoders import EncodingReport, TextFrames, TextScene, TextSource
 
 __all__ = ["TextFindings", "text_findings"]
 
@@ -24,24 +24,30 @@ class TextFindings:
 
 def text_findings(scene: TextScene) -> TextFindings:
     """What is to be said of a text whose frames were drawn."""
-    encoded = scene.text_frames.report
+    encoded, source = scene.text_frames.report, scene.text_frames.source
     differences, sentence = _back_check(scene.text_frames)
     more = (f"{encoded.split_total} words were split; the first {len(encoded.splits)} are listed.",)
     return TextFindings(
-        undefined=_undefined(encoded),
+        undefined=_undefined(encoded, source),
         split=tuple(
-            f"{split.word!r} at character {split.span[0]}, page {split.page + 1}, "
+            f"{split.word!r} at {_place(source, split.span[0])}, page {split.page + 1}, "
             + ("hyphenated" if split.hyphenated else "not at a syllable")
             for split in encoded.splits
         ),
         differences=differences,
-        notes=(sentence, *(more if encoded.split_total > len(encoded.splits) else ())),
+        notes=(*source.notes, sentence, *(more if encoded.split_total > len(encoded.splits) else ())),
     )
 
 
-def _undefined(encoded: EncodingReport) -> tuple[str, ...]:
+def _place(source: TextSource, position: int) -> str:
+    """A position of a text, and of a document where that is in its file."""
+    place = str(source.document.place_at(position)) if source.document else ""
+    return f"character {position}" + (f" ({place})" if place else "")
+
+
+def _undefined(encoded: EncodingReport, source: TextSource) -> tuple[str, ...]:
     return tuple(
-        f"{use.characters} ({use.count} times, first at character {use.first}): {use.action}"
+        f"{use.characters} ({use.count} times, first at {_place(source, use.first)}): {use.action}"
         + (f" as {use.written!r}" if use.written else "")
         for use in encoded.undefined
     )

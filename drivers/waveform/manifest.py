@@ -25,7 +25,9 @@ from ..errors import UnreadableWaveform, WaveformError
 from ..files.whole import naming
 from .coupling import CouplingEvent, CouplingWriter, LamTrack
 
-__all__ = ["MOST_BYTES", "SCHEMA", "FrameMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open"]
+__all__ = [
+    "MOST_BYTES", "SCHEMA", "FrameMark", "HeadingMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open",
+]  # fmt: skip
 
 Floats = NDArray[np.float64]
 
@@ -78,6 +80,17 @@ class FrameMark:
 
 
 @dataclass(frozen=True)
+class HeadingMark:
+    """A heading of a text as `encoders.Heading`, and where it is felt: number, page and start of the frame."""
+
+    level: int
+    text: str
+    frame: int
+    page: int
+    start_s: float
+
+
+@dataclass(frozen=True)
 class Manifest:
     """What a written waveform says about itself; times in seconds from the first sample.
 
@@ -89,6 +102,7 @@ class Manifest:
     coupling : events by time within each row.
     frames : in order of time.
     encoding : from the scene.
+    headings : of documents, in order; empty where none are known.
     """
 
     samples_file: str
@@ -100,6 +114,7 @@ class Manifest:
     coupling: tuple[CouplingEvent, ...]
     frames: tuple[FrameMark, ...]
     encoding: Mapping[str, Any]
+    headings: tuple[HeadingMark, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -189,6 +204,7 @@ class ManifestWriter:
         with naming(self._path), ExitStack() as stack:
             self._events = _Spool(stack.enter_context(tempfile.TemporaryFile(dir=self._path.parent)))
             self._marks = _Spool(stack.enter_context(tempfile.TemporaryFile(dir=self._path.parent)))
+            self._headings = _Spool(stack.enter_context(tempfile.TemporaryFile(dir=self._path.parent)))
             self._stack = stack.pop_all()
         return self
 
@@ -212,8 +228,11 @@ class ManifestWriter:
                 self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
             if frame.frame is not None:
                 self._marks.add(_mark(self._device, frame, self.frames))
+                for heading in frame.frame.headings:
+                    place = {"frame": self.frames, "page": frame.frame.page, "start_s": frame.start_s}
+                    self._headings.add({"level": heading.level, "text": heading.text} | place)
                 self.frames += 1
-        if self._events.size + self._marks.size > MOST_BYTES - REST_BYTES:
+        if self._events.size + self._marks.size + self._headings.size > MOST_BYTES - REST_BYTES:
             raise WaveformError(
                 f"{self._path}: a manifest of more than {MOST_BYTES} bytes is not read again; give less at a time"
             )
@@ -239,7 +258,8 @@ class ManifestWriter:
         }
         for key, value in head.items():
             out.write((b"{" if key == "schema" else b",") + b"\n" + _json(key) + b": " + _json(value))
-        for key, spool in (("coupling", self._events), ("frames", self._marks)):
+        headings = (("headings", self._headings),) if self._headings.size else ()
+        for key, spool in (("coupling", self._events), ("frames", self._marks), *headings):
             out.write(b",\n" + _json(key) + b": [")
             spool.copy_to(out)
             out.write(b"]")

@@ -21,7 +21,7 @@ from ..errors import UnreadableWaveform
 from ..files.whole import first_of_plain
 from ..formats.table import SUFFIXES
 from .coupling import CouplingEvent
-from .manifest import MOST_BYTES, FrameMark, Manifest
+from .manifest import MOST_BYTES, FrameMark, HeadingMark, Manifest
 
 __all__ = ["read_manifest"]
 
@@ -83,6 +83,14 @@ class _Frame(_Part):
     goes_on: list[_GoesOn] = []
 
 
+class _Heading(_Part):
+    level: Annotated[int, Field(ge=1, le=6)]
+    text: Words
+    frame: Index
+    page: Index
+    start_s: Seconds
+
+
 class _File(_Part):
     schema_: Literal["dotwave/waveform/1"] = Field(alias="schema")
     samples_file: Annotated[Words, Field(min_length=1)]
@@ -94,6 +102,7 @@ class _File(_Part):
     coupling: list[_Event]
     frames: list[_Frame]
     encoding: dict[str, Any] = {}
+    headings: list[_Heading] = []
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -160,6 +169,9 @@ class _Check:
                 )
             self._frame(f"frames[{index}]", frame)
             end_s = frame.end_s
+        for index, heading in enumerate(file.headings):
+            if heading.frame >= len(file.frames):
+                self._refuse(f"headings[{index}].frame", f"there is no frame {heading.frame}")
         if end_s * file.rate_hz > file.samples + 1:
             self._refuse(f"frames[{len(file.frames) - 1}].end_s", f"{end_s} s is after the last of the samples")
 
@@ -227,6 +239,7 @@ def _manifest(file: _File) -> Manifest:
         coupling=tuple(CouplingEvent(e.t_s, e.row, tuple(e.lam), e.ramp_s) for e in file.coupling),
         frames=tuple(_mark(frame, file.device) for frame in file.frames),
         encoding=file.encoding,
+        headings=tuple(HeadingMark(h.level, h.text, h.frame, h.page, h.start_s) for h in file.headings),
     )
 
 

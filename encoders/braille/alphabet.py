@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import unicodedata
+from collections import Counter
 from functools import cache, cached_property
 from pathlib import Path
 
 from . import louis_binding
 from .dots import BLANK, HIGHEST_6_DOT
 
-__all__ = ["Alphabet", "alphabet"]
+__all__ = ["Alphabet", "alphabet", "own_letters_eight"]
 
 _BRACKETS = (("(", ")"), ("[", "]"), ("{", "}"), ("<", ">"), ("\u201c", "\u201d"), ('"', '"'))
 
@@ -80,3 +82,17 @@ class Alphabet:
 def alphabet(tables: tuple[str, ...]) -> Alphabet:
     """The alphabet of `tables`, one for the whole process."""
     return Alphabet(tables)
+
+
+def own_letters_eight(text: str, tables: tuple[str, ...]) -> bool:
+    """Whether letters of the text's own script have 8-dot signs; words of another are written with six."""
+    letters = Counter({char: count for char, count in Counter(text).items() if char.isalnum()})
+    scripts = Counter[str]()
+    for char, count in letters.items():
+        scripts[_script(char)] += count
+    own = max(scripts, key=scripts.__getitem__, default="")
+    return any(alphabet(tables).dots(char) == 8 for char in sorted(letters) if _script(char) == own)
+
+
+def _script(char: str) -> str:
+    return unicodedata.name(char, "").partition(" ")[0]

@@ -10,23 +10,24 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from ..choices import Undefined
 from ..errors import TableMissing
 from ..scene import GoesOn
 from . import louis_binding
 from .alphabet import alphabet
-from .choices import Undefined
 from .dots import BLANK, LOWER_SIX
-from .joining import join_pages, unmarked
+from .joining import Emphases, join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
-from .transcribe import Transcriber, translate
+from .transcribe import Transcriber
+from .translation import translate
 from .undefined import writable
 
-__all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate", "covered_text"]
+__all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate"]
 
 PIECE = 2000
 """Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
@@ -55,11 +56,12 @@ class Difference:
 
 
 class FeltPage(NamedTuple):
-    """Cells of a page as `read_cells` gives them, the source text they show, and where words go on."""
+    """Cells of a page as `read_cells` gives them, the source text they show, where words go on, its emphases."""
 
     cells: str
     text: str = ""
     goes_on: tuple[GoesOn, ...] = ()
+    emphases: Emphases = ()
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,12 @@ def back_translate(tables: tuple[str, ...], cells: str) -> str:
     return "".join(parts)
 
 
-def back_check(pages: Iterable[FeltPage | str], text: str, encoding: Mapping[str, Any]) -> BackCheck:
+def back_check(
+    pages: Iterable[FeltPage | str],
+    text: str,
+    encoding: Mapping[str, Any],
+    emphases: Emphases = (),
+) -> BackCheck:
     """Compare what pages of felt cells say with `text`, together and each alone.
 
     Parameters
@@ -143,13 +150,14 @@ def back_check(pages: Iterable[FeltPage | str], text: str, encoding: Mapping[str
     pages : each page, or its cells only, as `read_cells` gives them; such are not read alone.
     text : the source the pages show; for Braille sources the cells themselves.
     encoding : of the scene.
+    emphases : (start, end, emphasis) of what is written with indicators in `text`.
     """
     given = list(pages)
     noted = "continuation" in encoding and not any(isinstance(page, str) for page in given)
     felt = [FeltPage(page) if isinstance(page, str) else page for page in given]
     joined = join_pages((page.cells for page in felt), encoding, (page.goes_on for page in felt) if noted else None)
     reading = _Reading(encoding)
-    source = TextSource(text, SourceKind(encoding["kind"]), "text")
+    source = TextSource(text, SourceKind(encoding["kind"]), "text", emphases=tuple(emphases))
     expected = reading.written(source)
     if source.kind is SourceKind.BRAILLE:
         same = joined == expected
@@ -157,13 +165,15 @@ def back_check(pages: Iterable[FeltPage | str], text: str, encoding: Mapping[str
         return BackCheck(same, same, same, joined, found[:KEPT], len(found))
     tables = reading.tables
     ready = writable(text, 0, alphabet(tables), reading.transcriber.undefined, ReportLog()).text
-    back = back_translate(tables, joined)
+    # Indicators of emphasis are read back by no table: where all cells are right, it is asked for those of the words.
+    said = reading.written(replace(source, emphases=())) if emphases and joined == expected else joined
+    back = back_translate(tables, said)
     found = tuple(_differences(_folded(ready).split(), _folded(back).split()))
     text_equal = not found or "".join(_folded(ready).split()) == "".join(_folded(back).split())
     alone = tuple(reading.alone(felt, encoding))
     return BackCheck(
         text_equal=text_equal,
-        again_equal=text_equal or _squeezed(tables, back, reading.transcriber.dots) == joined.replace(BLANK, ""),
+        again_equal=text_equal or _squeezed(tables, back, reading.transcriber.dots) == said.replace(BLANK, ""),
         cells_equal=joined == expected,
         back=back,
         differences=() if text_equal else found[:KEPT],
@@ -197,15 +207,16 @@ class _Reading:
         begun = False
         for number, page in enumerate(pages):
             text, goes_on = page.text.strip(), bool(page.goes_on)
-            back = self._reads_as(unmarked(page.cells, encoding, page.goes_on), text, begun, goes_on) if text else text
+            cells = unmarked(page.cells, encoding, page.goes_on)
+            back = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else text
             begun = goes_on
             if back != text:
                 yield Difference(text, back, number)
 
-    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool) -> str:
+    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> str:
         """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""
         log = ReportLog()
-        written = self.written(TextSource(text, SourceKind.TEXT, "page"), log)
+        written = self.written(TextSource(text, SourceKind.TEXT, "page", emphases=emphases), log)
         # The name of a character may be spread over pages that all show the one character.
         if cells == written or log.undefined_total:
             return text
@@ -272,22 +283,3 @@ def _resume(source: list[str], back: list[str]) -> tuple[int, int]:
             if left and left == right:
                 return a, total - a
     return max(1, min(len(source), REACH)) if source else 0, max(1, min(len(back), REACH)) if back else 0
-
-
-def covered_text(shown: Iterable[tuple[tuple[int, int], str]]) -> str:
-    """The source text of frames, joined: overlapping spans count once, a gap is one blank.
-
-    Parameters
-    ----------
-    shown : span and text of each frame, in order, as in `Frame`.
-    """
-    parts: list[str] = []
-    reached = -1
-    for (start, end), text in shown:
-        if end <= reached or not text:
-            continue
-        if reached >= 0 and start > reached:
-            parts.append(" ")
-        parts.append(text[max(0, reached - start) :])
-        reached = end
-    return "".join(parts)

@@ -1,16 +1,23 @@
-"""Pages of cells joined to one line again."""
+"""Pages joined again: their cells to one line, and the text and emphases they show."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import repeat
+from itertools import pairwise, repeat
+from operator import itemgetter
 from typing import Any
 
 from ..scene import GoesOn
 from .dots import BLANK
 
-__all__ = ["join_pages", "unmarked"]
+__all__ = [
+    "Emphases", "covered_emphases", "covered_text", "emphases_of", "emphases_within", "join_pages", "unmarked",
+]  # fmt: skip
+
+Emphases = tuple[tuple[int, int, int], ...]
+"""(start, end, emphasis) of what is written with indicators, in order and apart; see `encoders.Emphasis`."""
 
 
 def join_pages(
@@ -70,3 +77,60 @@ def unmarked(page: str, encoding: Mapping[str, Any], goes_on: Sequence[GoesOn]) 
     """
     last = len(page.replace("\n", "")) // int(encoding["run"]) - 1
     return join_pages([page], encoding, [[replace(one, ending="") if one.run == last else one for one in goes_on]])
+
+
+def covered_emphases(shown: Iterable[tuple[tuple[int, int], str]], emphases: Emphases) -> Emphases:
+    """Emphases of a source as positions in what `covered_text` gives of the same frames."""
+    found: list[tuple[int, int, int]] = []
+    length, reached = 0, -1
+    for (start, end), text in shown:
+        if end <= reached or not text:
+            continue
+        length += reached >= 0 and start > reached
+        first = max(start, reached)
+        found += emphases_within(emphases, first, end, length)
+        length += end - first
+        reached = end
+    return tuple(found)
+
+
+def emphases_within(emphases: Emphases, start: int, end: int, at: int = 0) -> Emphases:
+    """Those of the characters from `start` to `end`, as positions where `start` is `at`."""
+    found = []
+    for index in range(bisect_right(emphases, start, key=itemgetter(1)), len(emphases)):
+        low, high, form = emphases[index]
+        if low >= end:
+            break
+        found.append((max(low, start) - start + at, min(high, end) - start + at, form))
+    return tuple(found)
+
+
+def emphases_of(encoding: Mapping[str, Any]) -> Emphases:
+    """Those of a scene; what a manifest has there that is none is passed over."""
+    given = encoding.get("emphases", ())
+    found = sorted(tuple(one) for one in given if _is_emphasis(one)) if isinstance(given, list | tuple) else []
+    return tuple(one for before, one in pairwise([(0, 0, 0), *found]) if before[1] <= one[0])
+
+
+def _is_emphasis(value: Any) -> bool:
+    whole = isinstance(value, list | tuple) and len(value) == 3 and all(type(one) is int for one in value)
+    return whole and 0 <= value[0] < value[1] and 0 < value[2] < 8
+
+
+def covered_text(shown: Iterable[tuple[tuple[int, int], str]]) -> str:
+    """The source text of frames, joined: overlapping spans count once, a gap is one blank.
+
+    Parameters
+    ----------
+    shown : span and text of each frame, in order, as in `Frame`.
+    """
+    parts: list[str] = []
+    reached = -1
+    for (start, end), text in shown:
+        if end <= reached or not text:
+            continue
+        if reached >= 0 and start > reached:
+            parts.append(" ")
+        parts.append(text[max(0, reached - start) :])
+        reached = end
+    return "".join(parts)

@@ -85,7 +85,8 @@ class PlacedWord(NamedTuple):
 
     `text` is what the table was given for the word; its character k comes from the source position
     ``base + places[at + k]``, or ``base + at + k`` without `places`. `glued` continues the word before it; `lettered`
-    says whether it is a word of letters (None: not asked yet), `kept` how many of its first cells are restated.
+    says whether it is a word of letters (None: not asked yet), `kept` how many of its first cells are restated,
+    `emphasis` how all of it stands out.
     """
 
     cells: str
@@ -98,6 +99,7 @@ class PlacedWord(NamedTuple):
     glued: bool
     lettered: bool | None = None
     kept: int = 0
+    emphasis: int = 0
 
     def source(self, index: int) -> int:
         """Position in the source of character `index` of `text`."""

@@ -136,13 +136,18 @@ def compiles(tables: tuple[str, ...]) -> bool:
         return True
 
 
-def translate(tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
+def translate(
+    tables: tuple[str, ...], text: str, emphases: list[int] | None = None
+) -> tuple[str, list[int], list[int]]:
     """Cells of `text`, the text position of each cell, the cell position of each character.
 
-    The last list is shorter than `text` when the library stopped early. A position may be -1.
+    `emphases` has the typeform of each character; None where nothing stands out, as zeros are not the same to old
+    tables. The last list is shorter than `text` when the library stopped early. A position may be -1.
     """
     with _lock:
-        cells, text_of_cell, cell_of_text, _ = _louis().translate(list(tables), text, mode=_DOTS_AS_UNICODE)
+        cells, text_of_cell, cell_of_text, _ = _louis().translate(
+            list(tables), text, typeform=emphases, mode=_DOTS_AS_UNICODE
+        )
     return cells, text_of_cell, cell_of_text
 
 

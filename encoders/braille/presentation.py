@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..choices import Presentation
 from ..errors import LayoutError
 from ..scene import TargetPattern
-from .choices import Presentation
 from .dots import blocks
 from .layout import Layout
 

@@ -7,9 +7,9 @@ from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
+from ..choices import Grade
 from ..errors import TableMissing
 from . import louis_binding
-from .choices import Grade
 
 __all__ = ["TableInfo", "answer", "list_tables", "recommended_tables"]
 

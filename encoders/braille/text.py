@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-import unicodedata
-from collections import Counter
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
+from ..choices import EmphasisChoice, ImageChoice, Mathematics, Presentation, Undefined
 from ..errors import EmptyText, LayoutError
 from ..scene import Frame, GridShape, Scene, TargetPattern
 from . import louis_binding
-from .alphabet import alphabet
+from .alphabet import alphabet, own_letters_eight
 from .back_check import BackCheck, FeltPage, back_check
-from .choices import Presentation, Undefined
 from .dots import BLANK, HIGHEST_6_DOT
+from .joining import emphases_within
 from .layout import Cut, Layout, PlacedWord, cut_anywhere, paginate
 from .presentation import MIN_PART_S, presenter, read_cells
 from .readers.sources import SourceKind, TextSource
@@ -38,6 +40,14 @@ MOST_KEPT = 1 << 18
 """Actuators of all frames of a text together, up to which its frames are kept: 7281 frames of 6 x 6, some 10 MB."""
 
 
+WIDE = 12
+"""Cells of a line that has room for indicators of emphasis."""
+_CHOICES: dict[str, type[StrEnum]] = {
+    "undefined": Undefined, "presentation": Presentation, "emphasis": EmphasisChoice, "images": ImageChoice,
+    "math": Mathematics,
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class TextOptions:
     """How a text is encoded.
@@ -54,6 +64,12 @@ class TextOptions:
     presentation : dots together, by row, or by dot. None: together, and whoever plans it may take another.
     blank_between : a blank frame between paragraphs.
     dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
+    emphasis : whether emphasis of documents is written; None for lines of 12 cells or more.
+    images : whether images of documents are words or pictures; pictures are for `dotwave.text`, here they are words.
+    math : how formulas of documents are written, where a file is read.
+    encoding : of the characters of a file that is read; None for what it says itself, else UTF-8.
+    start_at : a page from 1, the words of a heading, or words of the text, at which to begin.
+    pages : such as ``10-20``, counted from there.
 
     A choice may be given as its word.
 
@@ -72,11 +88,17 @@ class TextOptions:
     presentation: Presentation | None = None
     blank_between: bool = False
     dots: int | None = None
+    emphasis: EmphasisChoice | None = None
+    images: ImageChoice = ImageChoice.WORDS
+    math: Mathematics = Mathematics.NEMETH
+    encoding: str | None = None
+    start_at: str | int | None = None
+    pages: str | int | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("undefined", Undefined), ("presentation", Presentation)):
+        for name, kind in _CHOICES.items():
             given = getattr(self, name)
-            if given is None and name == "presentation":
+            if given is None and name in ("emphasis", "presentation"):
                 continue
             if given not in list(kind):
                 raise LayoutError(f"{name}: expected one of {', '.join(kind)}, got {given!r}")
@@ -99,7 +121,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
 
     Frames are made while they are consumed, in memory that does not grow with the text. ``encoding`` holds
     what a reader of the dots needs: kind, tables, dots, cell_gap, line_gap, lines, cells_per_line, run,
-    hyphen and continuation (see `encoders.braille.layout`), passages, presentation, undefined, liblouis (its version).
+    hyphen and continuation (see `encoders.braille.layout`), passages, presentation, undefined, liblouis (its version),
+    and where emphasis is written, emphases.
 
     Raises
     ------
@@ -108,7 +131,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
     TableMissing, LouisMissing
         When the table, or the Braille library, cannot be used.
     LayoutError
-        When the grid has no room, an 8-dot table meets a grid with cells of three rows, or a time is not > 0.
+        When the grid has no room, an 8-dot table meets a grid with cells of three rows, a time is not > 0, or there
+        is no such page, heading or word to begin at.
     UndefinedCharacter
         When the policy is `error` and a character cannot be written.
     """
@@ -117,6 +141,21 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
     for name, value in (("rate", options.rate), ("dwell", options.dwell_s)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise LayoutError(f"{name}: expected a number > 0, got {value}")
+    if options.start_at is not None or options.pages is not None:
+        # Imported here: a text that is shown as a whole does without.
+        from .excerpt import excerpt
+
+        def page_spans(part: TextSource) -> Iterator[tuple[int, int]]:
+            return _frames_of(part, shape, options).page_spans()
+
+        source = excerpt(source, options.start_at, options.pages, page_spans)
+        # What is chosen is chosen: the frames' source and options give the same frames again.
+        options = replace(options, start_at=None, pages=None)
+    frames = _frames_of(source, shape, options)
+    return TextScene(shape, frames, frames.encoding)
+
+
+def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> TextFrames:
     tables = resolve_tables(options.table)
     dots = _dots(source, tables, shape, options)
     layout = Layout(shape, 3 if dots == 6 else 4, options.cell_gap, options.line_gap)
@@ -124,7 +163,9 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
     _refuse_unwritable(source, transcriber)
     if source.kind is SourceKind.TEXT and layout.run >= ROOM_FOR_SIGNS:
         layout = replace(layout, hyphen=transcriber.hyphen(), continuation=transcriber.continuation())
-    encoding = {
+    if _keeps_emphasis(options, layout) and source.document is not None:
+        source = replace(source, emphases=source.document.emphases)
+    encoding: dict[str, Any] = {
         "kind": source.kind.value,
         "tables": list(tables),
         "dots": dots,
@@ -140,7 +181,15 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
         "undefined": options.undefined.value,
         "liblouis": louis_binding.liblouis_version(),
     }
-    return TextScene(shape, TextFrames(source, transcriber, layout, options, encoding), encoding)
+    if source.emphases:
+        encoding["emphases"] = [list(one) for one in source.emphases]
+    return TextFrames(source, transcriber, layout, options, encoding)
+
+
+def _keeps_emphasis(options: TextOptions, layout: Layout) -> bool:
+    if options.emphasis is None:
+        return layout.cells_per_line >= WIDE
+    return options.emphasis is EmphasisChoice.KEEP
 
 
 def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options: TextOptions) -> int:
@@ -153,7 +202,7 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
         eight, what = max(source.text) > HIGHEST_6_DOT, f"{source.name} holds 8-dot cells"
     else:
         stated = table_dots(tables)
-        eight = stated == 8 or (not stated and _own_letters_eight(source.text, tables))
+        eight = stated == 8 or (not stated and own_letters_eight(source.text, tables))
         what = f"table {','.join(tables)} writes 8-dot cells"
     if not eight:
         return 6
@@ -163,20 +212,6 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
             "or give --dots 6 (dots 7 and 8 are left out)"
         )
     return 8
-
-
-def _own_letters_eight(text: str, tables: tuple[str, ...]) -> bool:
-    """Whether letters of the text's own script have 8-dot signs; words of another are written with six."""
-    letters = Counter({char: count for char, count in Counter(text).items() if char.isalnum()})
-    scripts = Counter[str]()
-    for char, count in letters.items():
-        scripts[_script(char)] += count
-    own = max(scripts, key=scripts.__getitem__, default="")
-    return any(alphabet(tables).dots(char) == 8 for char in sorted(letters) if _script(char) == own)
-
-
-def _script(char: str) -> str:
-    return unicodedata.name(char, "").partition(" ")[0]
 
 
 def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
@@ -213,9 +248,10 @@ class TextFrames:
     ) -> None:
         self.source = source
         self.layout = layout
+        self.encoding = encoding
         self._transcriber = transcriber
         self.options = options
-        self._encoding = encoding
+        self._headings = source.document.headings(source.text) if source.document else []
         self._log = ReportLog()
         self._kept: tuple[Frame, ...] | None = None
         self._show = presenter(layout, options.presentation or Presentation.TOGETHER)
@@ -255,11 +291,23 @@ class TextFrames:
             # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
             gap = PARAGRAPH_END.match(text, page.end) if page.end_of_paragraph else None
             span = (page.start, gap.end() if gap else page.end)
+            first, last = (bisect_left(self._headings, place, key=itemgetter(0)) for place in span)
+            headings = tuple(heading for _, heading in self._headings[first:last])
             for pattern in shown.parts:
-                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells, page.goes_on)
+                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells, page.goes_on, headings)
+                headings = ()
             log.frames += len(shown.parts)
             log.cells += len(page.cells) - page.cells.count(BLANK)
             log.pages += 1
+            between = self.options.blank_between and page.end_of_paragraph
+
+    def page_spans(self) -> Iterator[tuple[int, int]]:
+        """(start, end) in the source of every page, blank ones too; nothing is drawn."""
+        between = False
+        for page in paginate(self._words(ReportLog()), self.layout, self._cut, lambda word, cut: None):
+            if between:
+                yield page.start, page.start
+            yield page.start, page.end
             between = self.options.blank_between and page.end_of_paragraph
 
     def _blank_frame(self, log: ReportLog, position: int) -> Frame:
@@ -294,5 +342,6 @@ class TextFrames:
         for _, group in groupby(self, key=lambda frame: frame.page):
             parts = list(group)
             dots = np.any([np.abs(part.pattern.amplitude) > 0.5 for part in parts], axis=0)
-            pages.append(FeltPage(read_cells(dots, self._encoding), parts[0].text, parts[0].goes_on))
-        return back_check(pages, self.source.text, self._encoding)
+            emphases = emphases_within(self.source.emphases, *parts[0].span)
+            pages.append(FeltPage(read_cells(dots, self.encoding), parts[0].text, parts[0].goes_on, emphases))
+        return back_check(pages, self.source.text, self.encoding, self.source.emphases)

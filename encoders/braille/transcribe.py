@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, lru_cache
+from itertools import islice
+from typing import NamedTuple
 
-from ..errors import TableMissing
+from ..choices import Undefined
 from . import louis_binding
 from .alphabet import alphabet
-from .choices import Undefined
 from .cuts import Cutter, continuation_sign
 from .dots import BLANK, HIGHEST_6_DOT, LOWER_SIX
 from .layout import Cut, PlacedWord, cut_anywhere
 from .readers.sources import SourceKind, TextSource
 from .report import ReportLog
 from .tables import hyphenation_tables
+from .translation import translated
 from .undefined import ZERO_WIDTH_JOINER, Writable, extends, writable
 
-__all__ = ["PARAGRAPH_END", "Transcriber", "Translation", "translate"]
+__all__ = ["PARAGRAPH_END", "Transcriber"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
@@ -27,83 +29,36 @@ PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
 _ARROWS = "\u2190"
-_BRAILLE_RUN = re.compile("([\u2801-\u28ff]+)")
 
 
-@dataclass(frozen=True)
-class Translation:
-    """Cells of a text, with positions both ways.
-
-    Attributes
-    ----------
-    cells : Unicode Braille, a blank is U+2800.
-    text_of_cell : for each cell the position of the character it comes from, never falling.
-    cell_of_text : for each character the position of its first cell (or the cell it is contracted into).
-    """
+class _Piece(NamedTuple):
+    """Some of a text: its cells, the place of each in the text that was written, that text, its emphases."""
 
     cells: str
-    text_of_cell: tuple[int, ...]
-    cell_of_text: tuple[int, ...]
+    origin: list[int]
+    ready: Writable
+    forms: list[int] | None
 
 
-def translate(tables: tuple[str, ...], text: str) -> Translation:
-    """Cells of `text`; Unicode Braille in it passes through, whatever the table says of it.
-
-    Raises
-    ------
-    TableMissing
-        When the tables cannot be used.
-    """
-    cells, text_of_cell, cell_of_text = _translated(tables, text)
-    last = 0
-    repaired = []
-    for position in cell_of_text:  # the library leaves -1 where a character has no cell of its own
-        last = position if position >= 0 else last
-        repaired.append(last)
-    return Translation(cells, tuple(text_of_cell), tuple(repaired))
+def _forms(
+    emphases: Sequence[tuple[int, int, int]], start: int, stop: int, origins: Sequence[int] | None
+) -> list[int] | None:
+    """The emphasis of each character that is written of ``start:stop``, None where nothing stands out."""
+    first = bisect_right(emphases, start, key=lambda one: one[1])
+    forms: list[int] | None = None
+    for begin, end, form in islice(emphases, first, None):
+        if begin >= stop:
+            break
+        forms = forms or [0] * (stop - start)
+        low, high = max(begin, start) - start, min(end, stop) - start
+        forms[low:high] = [form] * (high - low)
+    return forms if forms is None or origins is None else [forms[place] for place in origins]
 
 
-def _translated(tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
-    if not _BRAILLE_RUN.search(text):
-        return _complete(tables, text)
-    cells, text_of_cell, cell_of_text = "", list[int](), list[int]()
-    at = 0
-    for part in _BRAILLE_RUN.split(text):
-        if not part:
-            continue
-        if _BRAILLE_RUN.match(part):
-            some, back, forth = part, list(range(len(part))), list(range(len(part)))
-        else:
-            some, back, forth = _complete(tables, part)
-        text_of_cell += [at + position for position in back]
-        cell_of_text += [len(cells) + position if position >= 0 else -1 for position in forth]
-        cells += some
-        at += len(part)
-    return cells, text_of_cell, cell_of_text
-
-
-def _complete(tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
-    """As the library does it, but to the end of the text also where it stops early."""
-    try:
-        cells, text_of_cell, cell_of_text = louis_binding.translate(tables, text)
-        while len(cell_of_text) < len(text):
-            done = len(cell_of_text)
-            more, back, forth = louis_binding.translate(tables, text[done:])
-            if not forth:
-                raise TableMissing(f"table {','.join(tables)}: stops at {text[done : done + 20]!r}; choose another")
-            text_of_cell += [done + position for position in back]
-            cell_of_text += [len(cells) + position if position >= 0 else -1 for position in forth]
-            cells += more
-    except RuntimeError:
-        why = louis_binding.complaint() or "unknown reason"
-        raise TableMissing(f"table {','.join(tables)}: cannot translate: {why}") from None
-    last = 0
-    for index, position in enumerate(text_of_cell):
-        if position < last:
-            text_of_cell[index] = last
-        else:
-            last = position
-    return cells, text_of_cell, cell_of_text
+def _emphasis_of(forms: Sequence[int], start: int, stop: int) -> int:
+    """The emphasis of a word, 0 where its characters differ."""
+    found = set(forms[start:stop])
+    return found.pop() if len(found) == 1 else 0
 
 
 class Transcriber:
@@ -138,7 +93,7 @@ class Transcriber:
         text = source.text
         held: PlacedWord | None = None
         for base, stop, glued in _pieces(text, start, end):
-            cells, origin, ready = self._piece(source, base, stop, log)
+            cells, origin, ready, forms = self._piece(source, base, stop, log)
             at = done = 0
             for word in cells.split(BLANK):
                 if word:
@@ -150,19 +105,22 @@ class Transcriber:
                         yield held._replace(end=_end(text, held.start, shown))
                     said = ready.text[here : max(done, here + 1)].rstrip()
                     joined = glued and at == 0 and held is not None
-                    held = PlacedWord(word, said, first, first, ready.origins, here, base, joined)
+                    emphasis = _emphasis_of(forms, here, max(done, here + 1)) if forms else 0
+                    held = PlacedWord(word, said, first, first, ready.origins, here, base, joined, emphasis=emphasis)
                 at += len(word) + 1
         if held is not None:
             yield held._replace(end=_end(text, held.start, end))
 
-    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> tuple[str, list[int], Writable]:
+    def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> _Piece:
         chunk = source.text[start:stop]
+        forms: list[int] | None = None
         if source.kind is SourceKind.BRAILLE:
             ready = Writable(chunk, None)
             cells, origin = _SPACE.sub(BLANK, chunk), list(range(len(chunk)))
         else:
             ready = writable(chunk, start, alphabet(self.tables), self.undefined, log)
-            cells, origin = self._written(ready.text)
+            forms = _forms(source.emphases, start, stop, ready.origins)
+            cells, origin = self._written(ready.text, forms)
         if self.dots == 6 and max(cells, default="") > HIGHEST_6_DOT:
             for at, cell in enumerate(cells):
                 if cell > HIGHEST_6_DOT:
@@ -172,12 +130,12 @@ class Transcriber:
                 position for position, cell in zip(origin, cells, strict=True) if cell == BLANK or _six_dots(cell)
             ]
             cells = _six_dots(cells)
-        return cells, origin, ready
+        return _Piece(cells, origin, ready, forms)
 
-    def _written(self, text: str) -> tuple[str, list[int]]:
+    def _written(self, text: str, forms: list[int] | None) -> tuple[str, list[int]]:
         cells, origin = "", list[int]()
-        for start, stop in [(0, len(text))] if self.passages else _apart(self.tables, text):
-            some, back, _ = _translated(self.tables, text[start:stop])
+        for start, stop in [(0, len(text))] if self.passages else _apart(self.tables, text, forms):
+            some, back, _ = translated(self.tables, text[start:stop], forms and forms[start:stop])
             cells += some
             origin += [start + position for position in back] if start else back
         return cells, origin
@@ -196,7 +154,7 @@ class Transcriber:
         """Where a word of text is cut that has more cells than `room`; see `encoders.braille.cuts`."""
         if not word.text:
             return cut_anywhere(word, room)
-        return _cutter(self.tables, self.dots, hyphen, continuation).cut(
+        return _cutter(self.tables, self.dots, hyphen, continuation, word.emphasis).cut(
             word.text, word.cells, room, word.kept, word.lettered
         )
 
@@ -210,12 +168,12 @@ _ONLY_LOWER = dict.fromkeys((0x2840, 0x2880, 0x28C0))
 
 
 @lru_cache(maxsize=16)
-def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str) -> Cutter:
+def _cutter(tables: tuple[str, ...], dots: int, hyphen: str, continuation: str, emphasis: int) -> Cutter:
     together = hyphenation_tables(tables) if hyphen else ()
 
     @lru_cache(maxsize=1 << 14)
     def write(text: str) -> str:
-        cells, _, _ = _translated(tables, text)
+        cells, _, _ = translated(tables, text, [emphasis] * len(text) if emphasis else None)
         cells = cells.strip(BLANK)
         return _six_dots(cells) if dots == 6 else cells
 
@@ -245,13 +203,14 @@ def _said(text: str, origin: list[int], at: int, stop: int, done: int) -> tuple[
     return start, origin[stop] if stop < len(origin) else len(text)
 
 
-def _apart(tables: tuple[str, ...], text: str) -> Iterator[tuple[int, int]]:
+def _apart(tables: tuple[str, ...], text: str, forms: Sequence[int] | None) -> Iterator[tuple[int, int]]:
     """(start, end) of parts, so that no two words that one indicator would stand for are in one."""
-    start, before = 0, frozenset[str]()
+    start, before = 0, frozenset[str | int]()
     kinds = _passages(tables)
-    if any(_MARKED[kind](text) for kind in kinds):
+    if forms or any(_MARKED[kind](text) for kind in kinds):
         for match in _WORD.finditer(text):
-            marked = frozenset(kind for kind in kinds if _MARKED[kind](match[0]))
+            marked: frozenset[str | int] = frozenset(kind for kind in kinds if _MARKED[kind](match[0]))
+            marked |= frozenset(form for form in forms[slice(*match.span())] if form) if forms else frozenset()
             if marked & before:
                 yield start, match.start()
                 start = match.start()
@@ -272,7 +231,7 @@ def _passages(tables: tuple[str, ...]) -> tuple[str, ...]:
     """Sorts of words that the tables mark once where several of them follow."""
 
     def written(text: str) -> str:
-        return _translated(tables, text)[0]
+        return translated(tables, text)[0]
 
     return tuple(kind for kind in _MARKED if written(" ".join([kind] * 4)) != BLANK.join([written(kind)] * 4))
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import groupby
 
+from ..choices import Undefined
 from ..errors import UndefinedCharacter
 from .alphabet import Alphabet
-from .choices import Undefined
 from .report import ReportLog
 
 __all__ = ["Writable", "extends", "name_of", "writable"]

@@ -1,18 +1,25 @@
-"""What is to be encoded, checked: from characters, bytes, a file or a stream."""
+"""What is to be encoded, checked: from characters, a document, bytes, a file or a stream."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from ...errors import EmptyText, InvalidText, UnsupportedSource
-from ...reading import first_bytes
-from .formats import MAX_BYTES, check_suffix, reader_of
+from ...choices import Mathematics
+from ...errors import DocumentsMissing, EmptyText, InvalidText, UnsupportedSource
+
+if TYPE_CHECKING:
+    from ...documents.flat import FlatDocument
+    from ...documents.model import Document
 
 __all__ = ["SourceKind", "TextSource"]
+
+
+# A thick book has some megabytes; one with pictures more.
+MAX_BYTES = 64_000_000
 
 
 class SourceKind(StrEnum):
@@ -24,7 +31,7 @@ class SourceKind(StrEnum):
 
 @dataclass(frozen=True)
 class TextSource:
-    """Checked input; build it with `of_text`, `of_bytes`, `of_path` or `of_stream`.
+    """Checked input; build it with `of_text`, `of_document`, `of_bytes`, `of_path` or `of_stream`.
 
     Attributes
     ----------
@@ -32,11 +39,15 @@ class TextSource:
         Braille these are cells U+2800..U+28FF. All positions in frames and reports count in it.
     kind : text or Braille.
     name : how the source is called in messages.
+    document : where in `text` its blocks, emphases and pictures are; None of a plain text.
+    emphases : (start, end, emphasis) of what is written with indicators, in order; see `encoders.Emphasis`.
     """
 
     text: str
     kind: SourceKind
     name: str
+    document: FlatDocument | None = None
+    emphases: tuple[tuple[int, int, int], ...] = ()
 
     @classmethod
     def of_text(cls, text: str, name: str = "text") -> TextSource:
@@ -66,57 +77,134 @@ class TextSource:
         return cls(lines, kind, name)
 
     @classmethod
-    def of_bytes(cls, data: bytes, name: str = "text", *, suffix: str = "") -> TextSource:
-        """A source from the bytes of a file with this ending (such as ``.brf``; '' for none), by `readers.formats`.
+    def of_document(
+        cls, document: Document, name: str = "document", *, math: Mathematics = Mathematics.NEMETH
+    ) -> TextSource:
+        """A source from the blocks of a document; what stands in `text` for formulas is chosen by `math`.
+
+        Raises
+        ------
+        EmptyText, InvalidText
+            As `of_text` does.
+        DocumentsMissing
+            When there are formulas, and no converter of them.
+        """
+        from ...documents.flat import flattened
+        from ...documents.maths import formula_writer
+
+        flat = flattened(document, formula_writer(math))
+        plain = cls.of_text(flat.text, name)
+        if len(plain.text) != len(flat.text):
+            raise InvalidText(f"{name}: {flat.place_at(0)}: a carriage return or a byte order mark in its text")
+        return cls(plain.text, plain.kind, name, flat)
+
+    @classmethod
+    def of_bytes(
+        cls,
+        data: bytes,
+        name: str = "text",
+        *,
+        suffix: str = "",
+        encoding: str | None = None,
+        math: Mathematics = Mathematics.NEMETH,
+    ) -> TextSource:
+        """A source from the bytes of a file, by `readers.formats`.
+
+        Parameters
+        ----------
+        data : the bytes.
+        name : how the source is called in messages.
+        suffix : ending of the file, such as ``.brf``; '' for none.
+        encoding : of its characters, before what it says itself; None for UTF-8 where it says nothing.
+        math : what becomes of formulas.
 
         Raises
         ------
         UnsupportedSource
-            When the bytes are of another known kind (PDF, archive, picture, UTF-16 ...).
+            When the bytes are of another known kind (an archive, a picture ...), or too many.
         InvalidText
-            With the offset of the first byte that is not UTF-8 (or not ASCII Braille), or of a NUL.
+            With the place of what is broken: an offset in bytes, or a part and a line.
         EmptyText
             When there is nothing to show.
+        DocumentsMissing
+            When a library that reads such files is not installed.
         """
+        from .formats import reader_of
+
         reader = reader_of(data, suffix, name)
         try:
-            text = reader.read(data)
-        except InvalidText as error:
-            raise InvalidText(f"{name}: {error}") from None
-        return cls.of_text(text, name)
+            found = reader.read(data, encoding)
+            if isinstance(found, str):
+                return cls.of_text(found, name)
+            return cls.of_document(found, name, math=math)
+        except (InvalidText, UnsupportedSource, DocumentsMissing) as error:
+            said = str(error)
+            raise type(error)(said if said.startswith(f"{name}: ") else f"{name}: {said}") from None
 
     @classmethod
-    def of_path(cls, path: Path) -> TextSource:
+    def of_path(cls, path: Path, *, encoding: str | None = None, math: Mathematics = Mathematics.NEMETH) -> TextSource:
         """A source from a file.
 
         Raises
         ------
-        UnsupportedSource, InvalidText, EmptyText
+        UnsupportedSource, InvalidText, EmptyText, DocumentsMissing
             As `of_bytes` does; also when the suffix says another kind, or the file cannot be read.
         """
+        # Imported here, as below: words that are given as such do without.
+        from ...reading import first_bytes
+        from .formats import check_suffix
+
         suffix = path.suffix.lower()
         check_suffix(suffix, str(path))
         try:
             data = first_bytes(path, MAX_BYTES + 1)
         except (OSError, ValueError) as error:
             raise UnsupportedSource(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-        return cls._of_first(data, str(path), suffix)
+        _check_size(data, str(path))
+        source = cls.of_bytes(data, str(path), suffix=suffix, encoding=encoding, math=math)
+        return replace(source, document=source.document and source.document.beside(path.parent))
 
     @classmethod
-    def of_stream(cls, stream: BinaryIO, name: str = "standard input", *, suffix: str = "") -> TextSource:
+    def of_stream(
+        cls,
+        stream: BinaryIO,
+        name: str = "standard input",
+        *,
+        suffix: str = "",
+        encoding: str | None = None,
+        math: Mathematics = Mathematics.NEMETH,
+    ) -> TextSource:
         """A source from a binary stream, read once to its end, which comes within 64 MB; raises as `of_bytes` does."""
         try:
             data = stream.read(MAX_BYTES + 1)
         except OSError as error:
             raise UnsupportedSource(f"{name}: cannot be read: {error.strerror or error}") from None
-        return cls._of_first(data, name, suffix)
+        _check_size(data, name)
+        return cls.of_bytes(data, name, suffix=suffix, encoding=encoding, math=math)
 
-    @classmethod
-    def _of_first(cls, data: bytes, name: str, suffix: str) -> TextSource:
-        """A source from the first bytes of something, which are one more than may be when it is too long."""
-        if len(data) > MAX_BYTES:
-            raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
-        return cls.of_bytes(data, name, suffix=suffix)
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on how it was read, for the person who reads it."""
+        return self.document.notes if self.document else ()
+
+    def part(self, start: int, end: int) -> TextSource:
+        """The characters from `start` to `end` as a source of their own; positions count from `start`.
+
+        Raises
+        ------
+        EmptyText
+            When there is nothing but white space.
+        """
+        text = self.text[start:end]
+        if not text.replace("\u2800", " ").strip():
+            raise EmptyText(f"{self.name}: there is nothing to show in characters {start} to {end}")
+        return replace(self, text=text, document=self.document and self.document.part(start, end), emphases=())
+
+
+def _check_size(data: bytes, name: str) -> None:
+    """Refuse the first bytes of something that are one more than may be."""
+    if len(data) > MAX_BYTES:
+        raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
 
 
 _SURROGATE = re.compile("[\ud800-\udfff]")

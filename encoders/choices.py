@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["Grade", "Presentation", "Undefined"]
+__all__ = ["EmphasisChoice", "Grade", "ImageChoice", "Mathematics", "Presentation", "Undefined"]
 
 
 class Undefined(StrEnum):
@@ -32,3 +32,24 @@ class Presentation(StrEnum):
     TOGETHER = "together"
     BY_ROW = "by-row"
     BY_DOT = "by-dot"
+
+
+class EmphasisChoice(StrEnum):
+    """Whether emphasis of a document (italic, bold, underlined) is written with the table's indicators."""
+
+    KEEP = "keep"
+    DROP = "drop"
+
+
+class ImageChoice(StrEnum):
+    """What is shown of the images in a document: the words they bring along, or their picture."""
+
+    WORDS = "words"
+    PICTURE = "picture"
+
+
+class Mathematics(StrEnum):
+    """How formulas of a document (MathML) are written: in Nemeth code by a converter, or in the words they bring."""
+
+    NEMETH = "nemeth"
+    WORDS = "words"
