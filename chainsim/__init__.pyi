@@ -26,6 +26,12 @@ from .continuation.spectrum import (
     rest_eigenvalues as rest_eigenvalues,
     spectrum_curve as spectrum_curve,
 )
+from .drawn.acting import (
+    CommonAmplifier as CommonAmplifier,
+)
+from .drawn.devices import (
+    DrawnDevices as DrawnDevices,
+)
 from .effects.effects import (
     AmplifierDynamics as AmplifierDynamics,
     BoucWen as BoucWen,
