@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..effects.effects import Creep, Play
 from ..model.device import Device
 from ..model.surroundings import Surroundings
+from .lanes import PLAYS
 
 __all__ = ["CREEP_DECADES", "CommonAmplifier", "creep_of", "plays_of"]
 
@@ -21,14 +22,14 @@ CREEP_DECADES = 3
 _EDGES = np.array([0.0, 0.1, 0.4, 1.2, np.inf])
 
 
-def plays_of(around: Surroundings) -> Play | None:
-    """Plays whose first loading is e - h, h following ``saturation (1 - exp(-hysteresis e/saturation))``, or None.
+def plays_of(around: Surroundings) -> Play:
+    """Four plays whose first loading is e - h, h following ``saturation (1 - exp(-hysteresis e/saturation))``.
 
-    Share of small forces and saturation are exact, the curve between them is a broken line. None where the loop has no
-    end, or is none: then h is `hysteresis` times e.
+    Share of small forces and saturation are exact, the curve between them is a broken line. Where the loop has no end,
+    or is none, h is `hysteresis` times e, and the plays have no weight.
     """
     if not around.hysteresis or math.isinf(around.largest_loop):
-        return None
+        return Play((0.0,) * PLAYS, (0.0,) * PLAYS, 1 - around.hysteresis)
     left = np.exp(-_EDGES)
     weight = left[:-1] - left[1:]
     # (edge + 1) exp(-edge), with its limit 0 at infinity.

@@ -13,10 +13,10 @@ from ..threads import in_threads
 from ..time_domain.as_built import AsBuilt
 from ..time_domain.integrate import LONGEST_STEP, limit_of
 from .acting import creep_of, plays_of
-from .kernel import Given, Shared, advance_drawn, flows_of_step
-from .lanes import OWN, WIDTH
+from .kernel import ChainSamples, Shared, advance_drawn, flows_of_step
+from .lanes import BETA_RUN, CREEPS, FLOWS_AT, GAIN_RUN, MODES, MOVES_RUN, RUNS, WIDTH
 
-__all__ = ["DrawnDevices"]
+__all__ = ["DrawnDevices", "DrawnNumbers"]
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -48,16 +48,14 @@ class DrawnDevices:
         self._device, self._around, self._count = device, around, count
         self._chains, self._n = device.rows * device.chains_per_row, device.chain_length
         blocks = -(-count // WIDTH)
-        drawn = _Drawn(device, around, range(first, first + blocks * WIDTH), seed)
+        drawn = DrawnNumbers(device, around, range(first, first + blocks * WIDTH), seed)
         self._seeds = drawn.seeds.reshape(blocks, WIDTH)
         softest = drawn.beta[drawn.beta < 0].max(initial=-np.inf)
         dtau = device.tau_per_s / rate_hz
         fastest = math.sqrt(max(float(drawn.stiffness.max()), 1.0))
         substeps = math.ceil(dtau * fastest / LONGEST_STEP)
         self._shared = _shared(device, around, dtau, substeps, limit_of(float(softest)))
-        shared = self._shared
-        runs = OWN + 2 * len(shared.mode_gains) + len(shared.radius) + len(shared.creep_steps)
-        self._work = self._at_rest(drawn, blocks, runs, dtau / substeps)
+        self._work = self._at_rest(drawn, blocks, dtau / substeps)
         self._load = np.zeros((blocks, self._chains, frames, self._n, weights, WIDTH))
         self._escaped = np.full((blocks, self._chains, WIDTH), np.iinfo(np.int64).max)
         self._noise, self._done = _noise(device, around), 0
@@ -101,7 +99,7 @@ class DrawnDevices:
         def work(part: slice) -> None:
             for unit in range(part.start, part.stop):
                 block, chain = divmod(unit, self._chains)
-                given = Given(
+                given = ChainSamples(
                     forces[chain], links[chain], self._noise[chain], place[chain], place.size, first, frame[skip:],
                     basis[chain // per_row, skip:],
                 )  # fmt: skip
@@ -117,23 +115,24 @@ class DrawnDevices:
         """(S, rows, cols) as (chains, S, n), a copy."""
         return np.array(np.moveaxis(values.reshape(len(values), self._chains, self._n), 1, 0), order="C")
 
-    def _at_rest(self, drawn: _Drawn, blocks: int, runs: int, step: float) -> Floats:
+    def _at_rest(self, drawn: DrawnNumbers, blocks: int, step: float) -> Floats:
         n = self._n
-        work = np.zeros((blocks, self._chains, n + 1, runs, WIDTH))
+        work = np.zeros((blocks, self._chains, n + 1, RUNS, WIDTH))
 
         def laid(values: Floats) -> Floats:
             """(devices, rows, cols) as (blocks, chains, n, WIDTH)."""
             return np.moveaxis(values.reshape(blocks, WIDTH, self._chains, n), 1, -1)
 
-        work[:, :, 0, 3] = 1.0
-        work[:, :, 1:, 3], work[:, :, 1:, 4] = laid(drawn.lam_gain), laid(drawn.beta)
+        actuators = work[:, :, 1:]
+        actuators[..., GAIN_RUN, :], actuators[..., BETA_RUN, :] = laid(drawn.lam_gain), laid(drawn.beta)
+        actuators[..., MOVES_RUN, :] = 1.0
         flows = flows_of_step(drawn.delta.ravel(), drawn.stiffness.ravel(), step)
         for run, values in enumerate(flows.reshape(12, *drawn.delta.shape)):
-            work[:, :, 1:, 8 + run] = laid(values)
+            actuators[..., FLOWS_AT // WIDTH + run, :] = laid(values)
         return work.reshape(blocks, self._chains, -1)
 
 
-class _Drawn:
+class DrawnNumbers:
     """What differs from device to device: float64, shape (devices, rows, cols) each; and the seeds of their noise."""
 
     def __init__(self, device: Device, around: Surroundings, numbers: range, seed: int) -> None:
@@ -156,17 +155,15 @@ class _Drawn:
 
 def _shared(device: Device, around: Surroundings, dtau: float, substeps: int, limit: float) -> Shared:
     play, creep = plays_of(around), creep_of(around, device.tau_per_s)
-    # The kernel takes modes in pairs; one of no gain does nothing.
-    modes = around.modes + (HigherMode(omega=1.0, delta=0.0, gain=0.0),) * (len(around.modes) % 2)
-    flows = flows_of_step(
-        _array(mode.delta for mode in modes), _array(mode.omega**2 for mode in modes), dtau / substeps
-    )  # fmt: skip
-    times = _array(() if creep is None else creep.times)
+    # A mode of no gain does nothing.
+    modes = (*around.modes, *[HigherMode(omega=1.0, delta=0.0, gain=0.0)] * MODES)[:MODES]
+    delta, square = np.array([[mode.delta, mode.omega**2] for mode in modes]).T
+    flows = flows_of_step(np.ascontiguousarray(delta), np.ascontiguousarray(square), dtau / substeps)
+    times = np.full(CREEPS, np.inf) if creep is None else np.array(creep.times)
+    piezo = np.concatenate([[play.base + sum(play.weight)], play.radius, play.weight, [mode.gain for mode in modes]])
     return Shared(
-        dtau, substeps, limit, device.chain.law.closed, around.preload,
-        1 - around.hysteresis if play is None else play.base,
-        _array(() if play is None else play.radius), _array(() if play is None else play.weight),
-        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), _array(mode.gain for mode in modes),
+        dtau, substeps, limit, device.chain.law.closed, around.preload, piezo,
+        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight) or creep is not None,
         -np.expm1(-dtau / times), 0.0 if creep is None else creep.per_decade / creep.each,
     )  # fmt: skip
 
@@ -179,7 +176,3 @@ def _noise(device: Device, around: Surroundings) -> Floats:
     bias = device.bias_per_volt if device.bias == "actuator" else 0.0
     found = volts * np.hypot(np.where(driven, drive, 0.0), bias)
     return np.ascontiguousarray(found).reshape(-1, device.chain_length)
-
-
-def _array(values: object) -> Floats:
-    return np.array(list(values), dtype=np.float64)  # type: ignore[call-overload]

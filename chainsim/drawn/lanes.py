@@ -1,4 +1,8 @@
-"""The loops over devices side by side: one actuator of WIDTH devices at a time, and how its numbers lie in memory."""
+"""The loops over devices side by side: one actuator of WIDTH devices at a time, and how its numbers lie in memory.
+
+All that a loop takes of one actuator stands at constant places of one slice, so the compiler need not ask what
+overlaps.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,8 @@ from numpy.typing import NDArray
 from ..inlined import inlined
 
 __all__ = [
-    "ELECTRIC", "FLOWS_AT", "MADE", "MOVES", "OWN", "PLAYS", "WIDTH", "add", "arrive", "bent_tip", "electric",
-    "flow_own", "flow_pair", "hiss", "kick", "kick_pair", "played", "pushed", "stiff_tip",
+    "BETA_RUN", "CREEPS", "FLOWS_AT", "GAIN_RUN", "MODES", "MOVES_RUN", "PLAYS", "RUNS", "TIP_RUN", "WIDTH", "add",
+    "arrive", "copy", "creep", "flow_all", "hiss", "kick_all", "push_all",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -18,19 +22,21 @@ Seeds = NDArray[np.uint64]
 WIDTH = 32
 """Devices side by side."""
 
-# An actuator's share of the workspace, in runs of WIDTH numbers: q, p, tip, gain of its link, beta, sum of its creeps,
-# noise at the last sample and its change to the next; four distinct flows of three coefficients each; then position and
-# velocity of every mode, the plays, the creeps.
-FLOWS_AT = 8 * WIDTH
-OWN = 20
-"""Runs before the modes."""
+MODES, PLAYS, CREEPS = 2, 4, 7
+"""Higher modes, play operators and relaxations of every actuator; creep has two to a decade, over three decades."""
 
-PLAYS = 4
-"""Play operators of every actuator, where there are any."""
+TIP_RUN, GAIN_RUN, BETA_RUN, MOVES_RUN = 2, 3, 4, 8
+"""Runs of WIDTH numbers in an actuator's share: its tip, what its link makes of lam, its beta, whether it moves."""
 
-# The first share is the chain's: in place of its tip that of a ring's last actuator, in place of the gain whether it
-# still moves, and room for the electric force and what hysteresis makes of it.
-MOVES, ELECTRIC, MADE = 3 * WIDTH, 4 * WIDTH, 5 * WIDTH
+_Q, _P, _TIP, _GAIN, _BETA, _CREPT, _NOISE, _HISS, _MOVES = (run * WIDTH for run in range(9))
+_MODE = 9 * WIDTH  # Position and velocity of each.
+_PLAY = _MODE + 2 * MODES * WIDTH
+_CREEP = _PLAY + PLAYS * WIDTH
+
+FLOWS_AT = _CREEP + CREEPS * WIDTH
+"""Where the four distinct flows of the oscillator begin, three coefficients each."""
+
+RUNS = FLOWS_AT // WIDTH + 12
 
 _GOLDEN, _FIRST_MIX, _SECOND_MIX = (
     np.uint64(word) for word in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
@@ -39,103 +45,88 @@ _TO_NORMAL = 1 / np.sqrt((65536.0**2 - 1) / 3)
 
 
 @inlined
-def flow_own(row: Floats, own: Floats) -> None:
-    """The flow of an oscillator of its own numbers."""
+def flow_all(row: Floats, own: Floats, first: Floats, second: Floats) -> None:
+    """The flows of an oscillator, by its own coefficients, and of its modes; leaves the tip."""
+    c1, s1, d1, c2, s2, d2 = first[0], first[1], first[2], second[0], second[1], second[2]
     for w in range(WIDTH):
-        x, y, c = row[w], row[WIDTH + w], own[w]
-        row[w] = c * x + own[WIDTH + w] * y
-        row[WIDTH + w] = c * y - own[2 * WIDTH + w] * x
+        x, y, c = row[_Q + w], row[_P + w], own[w]
+        x1, y1 = row[_MODE + w], row[_MODE + WIDTH + w]
+        x2, y2 = row[_MODE + 2 * WIDTH + w], row[_MODE + 3 * WIDTH + w]
+        x, y = c * x + own[WIDTH + w] * y, c * y - own[2 * WIDTH + w] * x
+        x1, y1 = c1 * x1 + s1 * y1, c1 * y1 - d1 * x1
+        x2, y2 = c2 * x2 + s2 * y2, c2 * y2 - d2 * x2
+        row[_Q + w], row[_P + w] = x, y
+        row[_MODE + w], row[_MODE + WIDTH + w] = x1, y1
+        row[_MODE + 2 * WIDTH + w], row[_MODE + 3 * WIDTH + w] = x2, y2
+        row[_TIP + w] = x + (x1 + x2)
 
 
 @inlined
-def flow_pair(pair: Floats, one: Floats, other: Floats) -> None:
-    """The flows of two modes."""
-    c, s, d, c2, s2, d2 = one[0], one[1], one[2], other[0], other[1], other[2]
-    for w in range(WIDTH):
-        x, y, x2, y2 = pair[w], pair[WIDTH + w], pair[2 * WIDTH + w], pair[3 * WIDTH + w]
-        pair[w] = c * x + s * y
-        pair[WIDTH + w] = c * y - d * x
-        pair[2 * WIDTH + w] = c2 * x2 + s2 * y2
-        pair[3 * WIDTH + w] = c2 * y2 - d2 * x2
-
-
-@inlined
-def kick_pair(pair: Floats, made: Floats, gain: float, gain2: float, one: Floats, other: Floats) -> None:
-    """A kick of two modes by what the piezo makes, and the flows after it."""
-    c, s, d, c2, s2, d2 = one[0], one[1], one[2], other[0], other[1], other[2]
-    for w in range(WIDTH):
-        x, y = pair[w], pair[WIDTH + w] + gain * made[w]
-        x2, y2 = pair[2 * WIDTH + w], pair[3 * WIDTH + w] + gain2 * made[w]
-        pair[w] = c * x + s * y
-        pair[WIDTH + w] = c * y - d * x
-        pair[2 * WIDTH + w] = c2 * x2 + s2 * y2
-        pair[3 * WIDTH + w] = c2 * y2 - d2 * x2
-
-
-@inlined
-def electric(row: Floats, before: Floats, head: Floats, at: float, force: float, lam: float, base: float) -> None:
-    """The electric force, and what a piezo without plays makes of it."""
-    for w in range(WIDTH):
-        given = head[MOVES + w] * (force + row[6 * WIDTH + w] + at * row[7 * WIDTH + w])
-        e = given + lam * row[3 * WIDTH + w] * (before[w] - row[2 * WIDTH + w])
-        head[ELECTRIC + w] = e
-        head[MADE + w] = base * e + row[5 * WIDTH + w]
-
-
-@inlined
-def played(
-    row: Floats, before: Floats, head: Floats, play: Floats, at: float, force: float, lam: float, base: float,
-    radius: Floats, weight: Floats,
+def kick_all(
+    row: Floats, before: Floats, own: Floats, at: float, force: float, lam: float, b: float, press: float,
+    piezo: Floats, first: Floats, second: Floats,
 ) -> None:  # fmt: skip
-    """The electric force, and what a piezo with plays makes of it."""
-    r0, r1, r2, r3 = radius[0], radius[1], radius[2], radius[3]
-    w0, w1, w2, w3 = weight[0], weight[1], weight[2], weight[3]
+    """A kick by what the piezo makes of its electric force, a press and the cubic term, then `flow_all`.
+
+    `piezo` is the force if no play were behind it, radii and weights of the plays, and the gains of the modes.
+    """
+    whole, r0, r1, r2, r3 = piezo[0], piezo[1], piezo[2], piezo[3], piezo[4]
+    w0, w1, w2, w3, g1, g2 = piezo[5], piezo[6], piezo[7], piezo[8], b * piezo[9], b * piezo[10]
+    c1, s1, d1, c2, s2, d2 = first[0], first[1], first[2], second[0], second[1], second[2]
     for w in range(WIDTH):
-        given = head[MOVES + w] * (force + row[6 * WIDTH + w] + at * row[7 * WIDTH + w])
-        e = given + lam * row[3 * WIDTH + w] * (before[w] - row[2 * WIDTH + w])
-        first = w0 * min(max(play[w], e - r0), e + r0) + w1 * min(max(play[WIDTH + w], e - r1), e + r1)
-        second = w2 * min(max(play[2 * WIDTH + w], e - r2), e + r2) + w3 * min(max(play[3 * WIDTH + w], e - r3), e + r3)
-        head[ELECTRIC + w] = e
-        head[MADE + w] = base * e + row[5 * WIDTH + w] + (first + second)
+        moves = row[_MOVES + w]
+        e = moves * (force + row[_NOISE + w] + at * row[_HISS + w])
+        e += lam * row[_GAIN + w] * (before[w] - row[_TIP + w])
+        behind = w0 * min(max(row[_PLAY + w] - e, -r0), r0) + w1 * min(max(row[_PLAY + WIDTH + w] - e, -r1), r1)
+        behind += w2 * min(max(row[_PLAY + 2 * WIDTH + w] - e, -r2), r2)
+        behind += w3 * min(max(row[_PLAY + 3 * WIDTH + w] - e, -r3), r3)
+        made = whole * e + (row[_CREPT + w] + behind)
+        x, c = row[_Q + w], own[w]
+        y = row[_P + w] + b * (made + press * moves - row[_BETA + w] * x * x * x)
+        x1, y1 = row[_MODE + w], row[_MODE + WIDTH + w] + g1 * made
+        x2, y2 = row[_MODE + 2 * WIDTH + w], row[_MODE + 3 * WIDTH + w] + g2 * made
+        x, y = c * x + own[WIDTH + w] * y, c * y - own[2 * WIDTH + w] * x
+        x1, y1 = c1 * x1 + s1 * y1, c1 * y1 - d1 * x1
+        x2, y2 = c2 * x2 + s2 * y2, c2 * y2 - d2 * x2
+        row[_Q + w], row[_P + w] = x, y
+        row[_MODE + w], row[_MODE + WIDTH + w] = x1, y1
+        row[_MODE + 2 * WIDTH + w], row[_MODE + 3 * WIDTH + w] = x2, y2
+        row[_TIP + w] = x + (x1 + x2)
 
 
 @inlined
-def pushed(head: Floats, play: Floats, radius: float) -> None:
-    """Push a play by the electric force."""
+def push_all(row: Floats, before: Floats, made: Floats, at: float, force: float, lam: float, piezo: Floats) -> None:
+    """Push the plays by the electric force; `made` gets what they and the rest make of it, without creep."""
+    whole, r0, r1, r2, r3 = piezo[0], piezo[1], piezo[2], piezo[3], piezo[4]
+    w0, w1, w2, w3 = piezo[5], piezo[6], piezo[7], piezo[8]
     for w in range(WIDTH):
-        e = head[ELECTRIC + w]
-        play[w] = min(max(play[w], e - radius), e + radius)
+        e = row[_MOVES + w] * (force + row[_NOISE + w] + at * row[_HISS + w])
+        e += lam * row[_GAIN + w] * (before[w] - row[_TIP + w])
+        p0 = min(max(row[_PLAY + w] - e, -r0), r0)
+        p1 = min(max(row[_PLAY + WIDTH + w] - e, -r1), r1)
+        p2 = min(max(row[_PLAY + 2 * WIDTH + w] - e, -r2), r2)
+        p3 = min(max(row[_PLAY + 3 * WIDTH + w] - e, -r3), r3)
+        row[_PLAY + w], row[_PLAY + WIDTH + w] = e + p0, e + p1
+        row[_PLAY + 2 * WIDTH + w], row[_PLAY + 3 * WIDTH + w] = e + p2, e + p3
+        made[w] = whole * e + (w0 * p0 + w1 * p1 + (w2 * p2 + w3 * p3))
 
 
 @inlined
-def kick(row: Floats, head: Floats, own: Floats, b: float, preload: float) -> None:
-    """A kick of an oscillator by what the piezo makes, a press and its cubic term, and the flow after it."""
+def creep(row: Floats, made: Floats, share: Floats, gain: float) -> None:
+    """Let every relaxation go its share of the way to its end, and add them up."""
     for w in range(WIDTH):
-        x = row[w]
-        pushed = head[MADE + w] + preload * head[MOVES + w]
-        y = row[WIDTH + w] + b * (pushed - row[4 * WIDTH + w] * x * x * x)
-        c = own[w]
-        row[w] = c * x + own[WIDTH + w] * y
-        row[WIDTH + w] = c * y - own[2 * WIDTH + w] * x
-
-
-@inlined
-def stiff_tip(tip: Floats, q: Floats) -> None:
-    """A tip without modes; also a copy."""
-    for w in range(WIDTH):
-        tip[w] = q[w]
-
-
-@inlined
-def bent_tip(tip: Floats, q: Floats, pair: Floats) -> None:
-    """A tip with two modes."""
-    for w in range(WIDTH):
-        tip[w] = q[w] + (pair[w] + pair[2 * WIDTH + w])
+        end, total = gain * made[w], 0.0
+        for i in range(CREEPS):
+            part = row[_CREEP + i * WIDTH + w]
+            part += share[i] * (end - part)
+            row[_CREEP + i * WIDTH + w] = part
+            total += part
+        row[_CREPT + w] = total
 
 
 @inlined
 def hiss(row: Floats, seeds: Seeds, count: int, rms: float) -> None:
-    """The change to the noise of sample and channel `count`: four uniform numbers of a hash, added (Irwin and Hall)."""
+    """The change to the noise of number `count`: four uniform numbers of a hash, added (Irwin and Hall)."""
     step = np.uint64(count) * _GOLDEN
     for w in range(WIDTH):
         x = seeds[w] + step
@@ -144,19 +135,26 @@ def hiss(row: Floats, seeds: Seeds, count: int, rms: float) -> None:
         x = x ^ (x >> np.uint64(31))
         low, part = np.uint64(65535), (x >> np.uint64(32))
         total = (x & low) + ((x >> np.uint64(16)) & low) + (part & low) + (part >> np.uint64(16))
-        row[7 * WIDTH + w] = rms * _TO_NORMAL * (np.float64(total) - 131070.0) - row[6 * WIDTH + w]
+        row[_HISS + w] = rms * _TO_NORMAL * (np.float64(total) - 131070.0) - row[_NOISE + w]
 
 
 @inlined
 def arrive(row: Floats) -> None:
     """Make the next sample's noise the present one."""
     for w in range(WIDTH):
-        row[6 * WIDTH + w] += row[7 * WIDTH + w]
-        row[7 * WIDTH + w] = 0.0
+        row[_NOISE + w] += row[_HISS + w]
+        row[_HISS + w] = 0.0
 
 
 @inlined
-def add(into: Floats, weight: float, tip: Floats) -> None:
+def add(into: Floats, weight: float, row: Floats) -> None:
     """Collect a tip times its weight."""
     for w in range(WIDTH):
-        into[w] += weight * tip[w]
+        into[w] += weight * row[_TIP + w]
+
+
+@inlined
+def copy(into: Floats, row: Floats) -> None:
+    """Keep a tip."""
+    for w in range(WIDTH):
+        into[w] = row[_TIP + w]

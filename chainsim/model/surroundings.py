@@ -41,7 +41,7 @@ class Surroundings(_Part):
     saturation : what h never exceeds, dimensionless force; None is no end.
     creep_per_decade : growth of a constant force's effect in every decade of time, for three decades.
     creep_first_s : where the first of them begins, seconds.
-    modes : higher bending modes.
+    modes : higher bending modes, at most two.
     row_lam : coupling from the actuator above, which no profile has.
     bandwidth_hz : -3 dB of the amplifier; None is no end.
     amplifier_noise : of every amplifier channel, rms at all frequencies up to half of its rate, relative to its volts.
@@ -56,7 +56,7 @@ class Surroundings(_Part):
     saturation: Positive | None = None
     creep_per_decade: NotNegative = 0.0
     creep_first_s: Positive = 0.1
-    modes: Annotated[tuple[HigherMode, ...], Field(max_length=8)] = ()
+    modes: Annotated[tuple[HigherMode, ...], Field(max_length=2)] = ()
     row_lam: NotNegative = 0.0
     bandwidth_hz: Positive | None = None
     amplifier_noise: Share = 0.0

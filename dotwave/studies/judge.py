@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chainsim import Device, Outcome, load_rung, surroundings_of
+from chainsim import Device, Outcome, load_rung
 from encoders import TargetPattern
 from planner import FramePlan, Plan
 
@@ -152,6 +152,7 @@ class Judge:
         return YieldReport(float(devices[0].mean()), spread.wanted, asked, needed, spread.spread, spread.draws)
 
     def _required(self, device: Device, tol: float) -> Requirement:
+        from chainsim import surroundings_of
         from planner import require
 
         frames = [frame for frame in self._frames if frame is not self._last]
