@@ -19,7 +19,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 Seeds = NDArray[np.uint64]
 
-WIDTH = 32
+WIDTH = 16
 """Devices side by side."""
 
 MODES, PLAYS, CREEPS = 2, 4, 7
