@@ -20,7 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from chainsim import Device, Setting, load_device
+from chainsim import Device, Setting, load_device, surroundings_of
 from chainsim.effects.effects import Tone
 from chainsim.effects.tones import two_tones
 from encoders import (
@@ -35,7 +35,7 @@ from encoders import (
     plane_wave,
     walking_bars,
 )
-from planner import FramePlan, TradeoffError, assumed, plan_scene, require, seconds_words, trade_off
+from planner import FramePlan, TradeoffError, plan_scene, require, seconds_words, trade_off
 
 KEPT = Path(__file__).resolve().parent / "results" / "front.json"
 SHAPE = GridShape(6, 6)
@@ -77,7 +77,7 @@ def measured(name: str) -> dict[str, Any]:
     frames = list(plan_scene(make(), device).frames)
     planned_s = time.perf_counter() - began
     began = time.perf_counter()
-    required = require(frames, device, assumed(device), tol=TOL)
+    required = require(frames, device, surroundings_of(device), tol=TOL)
     required_s = time.perf_counter() - began
     found: dict[str, Any] = {
         "device": profile, "frames": len(frames), "outcomes": sorted({frame.outcome.value for frame in frames}),

@@ -26,6 +26,12 @@ from .continuation.spectrum import (
     rest_eigenvalues as rest_eigenvalues,
     spectrum_curve as spectrum_curve,
 )
+from .drawn.acting import (
+    CommonAmplifier as CommonAmplifier,
+)
+from .drawn.devices import (
+    DrawnDevices as DrawnDevices,
+)
 from .effects.effects import (
     AmplifierDynamics as AmplifierDynamics,
     BoucWen as BoucWen,
@@ -91,6 +97,10 @@ from .harmonic_balance.sensitivity import (
     Gradient as Gradient,
     gradient as gradient,
 )
+from .model.assumed import (
+    assumed_of as assumed_of,
+    surroundings_of as surroundings_of,
+)
 from .model.calibrated import (
     Actuator as Actuator,
     ActuatorSpread as ActuatorSpread,
@@ -100,7 +110,6 @@ from .model.device import (
     Amplifier as Amplifier,
     Coupling as Coupling,
     Device as Device,
-    DeviceSurroundings as DeviceSurroundings,
     Note as Note,
     Span as Span,
     device_names as device_names,
@@ -111,6 +120,10 @@ from .model.response import (
     Outcome as Outcome,
     Response as Response,
     Stats as Stats,
+)
+from .model.surroundings import (
+    HigherMode as HigherMode,
+    Surroundings as Surroundings,
 )
 from .npy_header import (
     NpyHeader as NpyHeader,

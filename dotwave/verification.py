@@ -19,7 +19,7 @@ from encoders import FeltPage, back_check, covered_emphases, covered_text, empha
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
 
-__all__ = ["verify"]
+__all__ = ["forces_under", "frequencies", "verify"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -93,14 +93,9 @@ class _Integration:
 
     def advance(self, volts: Floats) -> None:
         """Take the next block of samples, float64, shape (S, channels), volts."""
-        device, manifest = self._device, self._manifest
+        manifest = self._manifest
         index = np.arange(self.position, self.position + len(volts))
-        force = np.zeros((len(volts), device.rows, device.cols))
-        for channel in manifest.channels:
-            row, col = channel.row, channel.col or 0
-            driven = channel.role is Role.DRIVE
-            per_volt = self._built.drive_per_volt[row, col] if driven else device.bias_per_volt
-            force[:, row, col] += volts[:, channel.index] * per_volt
+        force = forces_under(volts, manifest, self._built)
         z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz) * self._built.lam_gain)
         for fit in self._fits[self._first :]:
             if fit.first > index[-1]:
@@ -125,6 +120,27 @@ class _Integration:
             )
 
 
+def forces_under(volts: Floats, manifest: Manifest, built: AsBuilt) -> Floats:
+    """Dimensionless force on every actuator under a block of samples.
+
+    Parameters
+    ----------
+    volts : float64, shape (S, channels).
+
+    Returns
+    -------
+    float64, shape (S, rows, cols).
+    """
+    device = manifest.device
+    force = np.zeros((len(volts), device.rows, device.cols))
+    for channel in manifest.channels:
+        row, col = channel.row, channel.col or 0
+        driven = channel.role is Role.DRIVE
+        per_volt = built.drive_per_volt[row, col] if driven else device.bias_per_volt
+        force[:, row, col] += volts[:, channel.index] * per_volt
+    return force
+
+
 class _Fit:
     """Least squares of 1 and of cos and sin at each row's frequencies over the samples of one frame."""
 
@@ -132,7 +148,7 @@ class _Fit:
         self._device, self._mark, self._rate_hz = device, mark, rate_hz
         self.first = round(mark.settled_s * rate_hz)
         self.stop = round(mark.end_s * rate_hz)
-        self._rates = [_frequencies(omega, tones) for omega, tones in zip(mark.omega, mark.tones, strict=True)]
+        self._rates = [frequencies(omega, tones) for omega, tones in zip(mark.omega, mark.tones, strict=True)]
         sizes = [1 + 2 * len(rates) for rates in self._rates]
         self._gram = [np.zeros((size, size)) for size in sizes]
         self._load = [np.zeros((size, device.cols)) for size in sizes]
@@ -188,7 +204,7 @@ class _Fit:
         return np.where(np.isnan(mark.phase), 0.0, away)
 
 
-def _frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
+def frequencies(omega: float, tones: tuple[float, ...]) -> list[float]:
     """The tones of a row, then the combinations that a cubic spring makes of them beside each; none where it rests."""
     own = [float(omega), *tones] if omega else []
     return own + sorted({2 * one - other for one in own for other in own} - set(own))

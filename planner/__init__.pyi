@@ -106,11 +106,6 @@ from .scene_plan import (
     kept_share as kept_share,
     plan_scene as plan_scene,
 )
-from .surroundings import (
-    HigherMode as HigherMode,
-    Surroundings as Surroundings,
-    assumed as assumed,
-)
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
 )

@@ -17,8 +17,9 @@ from ..equations.coupling import Closure, law_of
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
+from .surroundings import Surroundings
 
-__all__ = ["Amplifier", "Coupling", "Device", "DeviceSurroundings", "Note", "Span", "device_names", "load_device"]
+__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
@@ -92,16 +93,6 @@ class Amplifier(_Part):
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
-class DeviceSurroundings(_Part):
-    """What acts on a device beside what it is made of and told to do; what is left out is nothing.
-
-    `amplifier_noise` is the root mean square of what an amplifier adds to its output, spread evenly up to half of
-    `rate_hz`, as a share of its `volts`.
-    """
-
-    amplifier_noise: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
-
-
 class Note(_Part):
     """Where a value of the profile comes from."""
 
@@ -139,8 +130,9 @@ class Device(_Part):
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
         lam: 0.0}`` (relative standard deviations); plans are then made for many such devices. None: none is known.
-    surroundings : what acts on it besides, ``{amplifier_noise: 1.0e-5}``; plans count it as error. None: nothing does.
-    notes : field name -> where the value comes from.
+    surroundings : what acts on the device beside all that; plans count its `amplifier_noise` as error, `explain` and
+        as-built studies all of it.
+    notes : field name, or ``surroundings.`` and a name in there -> where the value comes from.
 
     Examples
     --------
@@ -173,7 +165,7 @@ class Device(_Part):
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
-    surroundings: DeviceSurroundings | None = None
+    surroundings: Surroundings | None = None
     notes: dict[str, Note] = {}
 
     @model_validator(mode="after")
@@ -188,7 +180,8 @@ class Device(_Part):
         wrong = wrong or far_off(self.actuators, self.f0_hz)
         if wrong:
             raise ValueError(wrong)
-        unknown = sorted(set(self.notes) - set(type(self).model_fields))
+        known = {*type(self).model_fields, *(f"surroundings.{name}" for name in Surroundings.model_fields)}
+        unknown = sorted(set(self.notes) - known)
         if unknown:
             raise ValueError(f"notes.{unknown[0]}: the profile has no such field")
         if self.beta < 0 and self.full_scale >= self.escape_amplitude:

@@ -14,12 +14,12 @@ from ..threads import in_threads
 from .grid_kernels import WIDTH, Actuators, Chains, Stretch, advance_chains, advance_unequal
 from .linked_kernels import Samples, Wiring, advance_linked
 
-__all__ = ["Escape", "GridError", "GridIntegrator"]
+__all__ = ["LONGEST_STEP", "Escape", "GridError", "GridIntegrator", "limit_of"]
 
 Floats = NDArray[np.float64]
 
-# At a resonance of every stage (Q = 189, lam = 1, six stages) the error is then about 5e-7 of the amplitude.
-_LONGEST_STEP = 0.06
+LONGEST_STEP = 0.06
+"""At a resonance of every stage (Q = 189, lam = 1, six stages) the error is then about 5e-7 of the amplitude."""
 
 
 class GridError(ChainError, ValueError):
@@ -96,9 +96,9 @@ class GridIntegrator:
         self._wiring = None if self._law.plain else Wiring(*self._law.sources(n), self._law.back)
         self._each = each if unequal or self._wiring else None
         softest = each.beta[each.beta < 0].max(initial=-np.inf)
-        limit = 50 / math.sqrt(-softest) if np.isfinite(softest) else 1e9
+        limit = limit_of(float(softest))
         fastest = math.sqrt(max(float(each.stiffness.max()), 1.0))
-        substeps = math.ceil(dtau * fastest / _LONGEST_STEP)
+        substeps = math.ceil(dtau * fastest / LONGEST_STEP)
         first = float(each.delta[0, 0]), float(each.beta[0, 0])
         self._system = Chains(*first, bool(ring), float(dtau), substeps, limit)
         self._escaped = np.full((chains, 2), -1, dtype=np.int64)
@@ -220,6 +220,11 @@ class GridIntegrator:
         if self._down:
             z = z.reshape(len(z), z.shape[1], self._shape[0], self._length).swapaxes(1, 2)
         return np.ascontiguousarray(z).reshape(len(z), *self._shape)
+
+
+def limit_of(softest: float) -> float:
+    """The |z| beyond which a chain has escaped, by its beta nearest to 0 of those below; -inf where there is none."""
+    return 50 / math.sqrt(-softest) if math.isfinite(softest) else 1e9
 
 
 def _law(length: int, ring: bool, both_ways: bool, down: bool, kind: str) -> CouplingLaw:

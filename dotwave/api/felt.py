@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 from ..reports.html import html_table
 from ..reports.text import VerifyReport, decibels
@@ -14,12 +13,23 @@ from ..verification import verify as verify_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .plans import PlanWaveform, ScenePlan
+    from ..as_built.report import AsBuiltReport
+    from .memory import Playable
 
 __all__ = ["Felt", "verify"]
 
 
-def verify(what: str | PathLike[str] | ScenePlan | PlanWaveform) -> Felt:
+@overload
+def verify(what: Playable, *, devices: None = None, seed: int = 0, scheduler: str | None = None) -> Felt: ...
+
+
+@overload
+def verify(what: Playable, *, devices: int, seed: int = 0, scheduler: str | None = None) -> AsBuiltReport: ...
+
+
+def verify(
+    what: Playable, *, devices: int | None = None, seed: int = 0, scheduler: str | None = None
+) -> Felt | AsBuiltReport:
     """Integrate the device's full equations under the samples of a waveform and say what is felt.
 
     Of a file nothing but the samples and the manifest beside them is read. A plan or a waveform in memory is written
@@ -29,11 +39,19 @@ def verify(what: str | PathLike[str] | ScenePlan | PlanWaveform) -> Felt:
     ----------
     what : path, ScenePlan or PlanWaveform
         A written waveform (the samples or the manifest), a plan, or its waveform.
+    devices : int, optional
+        Say instead what is felt on so many devices as built, drawn at random, with all that surrounds them.
+    seed : int
+        Of these devices.
+    scheduler : str, optional
+        Address of a dask.distributed scheduler whose workers do it.
 
     Returns
     -------
     Felt
         With `ok`, `frames` and `text`.
+    dotwave.as_built.report.AsBuiltReport
+        When `devices` are asked for, with `ok`, `yield_`, `worst_dot`, `effects` and `as_text()`.
 
     Raises
     ------
@@ -50,13 +68,19 @@ def verify(what: str | PathLike[str] | ScenePlan | PlanWaveform) -> Felt:
     (True, 'Hi')
     >>> felt.frames[0].amplitude.shape
     (6, 6)
+    >>> dw.verify(dw.plan(dw.text("Hi", "paper-6x6"), "paper-6x6"), devices=10).devices
+    10
     """
-    if isinstance(what, str | PathLike):
-        return Felt.of(verify_file(Path(what)))
     from .memory import MEMORY, on_disk
 
+    name = None if isinstance(what, str | PathLike) else MEMORY
     with on_disk(what) as path:
-        return Felt.of(verify_file(path), MEMORY)
+        if devices is None:
+            return Felt.of(verify_file(path), name)
+        from ..as_built.study import AsBuiltStudy, verify_as_built
+
+        report = verify_as_built(path, AsBuiltStudy(devices, seed, scheduler))
+        return report if name is None else replace(report, path=name)
 
 
 @dataclass(frozen=True, repr=False)

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from chainsim import Outcome
+from chainsim import Outcome, surroundings_of
 from drivers import Encoding, Waveform, channels_of
 from encoders import Scene
 from planner import FramePlan, Plan, plan_scene
@@ -180,11 +180,11 @@ class ScenePlan(Plan, Sequence[FramePlan]):
         >>> print(plan.explain().as_text().splitlines()[0])
         What this scene requires on paper-6x6:
         """
-        from planner import assumed, require
+        from planner import require
 
         from ..studies.tradeoff import ExplainReport
 
-        return ExplainReport(require(self.frames, self.device, assumed(self.device), tol=tol))
+        return ExplainReport(require(self.frames, self.device, surroundings_of(self.device), tol=tol))
 
     def report(self) -> Report:
         """What `dotwave text`, `image` or `render` say of it; plans every frame.

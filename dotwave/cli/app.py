@@ -24,7 +24,7 @@ from typer.models import CommandInfo
 
 from encoders import EmphasisChoice, Grade, ImageChoice, Mathematics, Presentation, Undefined
 
-from ..errors import Terminated
+from ..errors import AppError, Terminated
 from .command import (
     Actuator,
     Budget,
@@ -177,18 +177,40 @@ def simulate(
 
 
 @app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)
-def verify(out: Written, as_json: Json = False) -> None:
+def verify(
+    out: Written,
+    as_built: Annotated[
+        bool, typer.Option("--as-built", help="On many devices, with all that surrounds them in the profile.")
+    ] = False,
+    devices: Annotated[int | None, typer.Option(min=1, help="How many with --as-built; default: 1000.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of these devices; default: 0.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler whose workers do --as-built.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Integrate the full equations under the samples of a written waveform and say what is felt.
 
     Reads only the samples and the manifest beside them. The exit code is 1 when a dot is wrong, a level
-    is outside its limits, or the text does not come back.
+    is outside its limits, or the text does not come back; with --as-built, when that is so on any device.
+
+    --as-built draws devices with the spread, hysteresis, creep, higher modes, amplifier and fingertip that the
+    profile's section surroundings tells or assumes, and says the yield, the worst dot, contrasts, and which effect
+    spoils what.
 
     \b
     Example:
-      dotwave verify hello.wav
+      dotwave verify hello.wav --as-built --devices 200
     """
     from ..api.felt import verify as check
 
+    asked = {"devices": devices, "seed": seed, "scheduler": scheduler}
+    if as_built:
+        built = check(Path(out), devices=devices or 1000, seed=seed or 0, scheduler=scheduler)
+        _finish(built, as_json, ok=built.ok)
+    for name, value in asked.items():
+        if value is not None:
+            raise AppError(f"--{name} belongs to --as-built; add that, or leave it out")
     report = check(Path(out))
     _finish(report, as_json, ok=report.ok)
 

@@ -124,9 +124,17 @@ def _all_values(device: Device) -> Iterator[str]:
     for name, value in device.as_dict().items():
         if name in {"schema", "name", "description", "notes"}:
             continue
-        note = device.notes.get(name)
-        source = "" if note is None else f"  ({'assumed' if note.assumed else 'given'}: {note.why})"
-        yield f"  {name}: {_flat(value)}{source}"
+        if name == "surroundings":
+            for part, inner in value.items():
+                yield _with_source(device, f"surroundings.{part}", inner)
+        else:
+            yield _with_source(device, name, value)
+
+
+def _with_source(device: Device, name: str, value: object) -> str:
+    note = device.notes.get(name)
+    source = "" if note is None else f"  ({'assumed' if note.assumed else 'given'}: {note.why})"
+    return f"  {name}: {_flat(value)}{source}"
 
 
 def _flat(value: object) -> str:

@@ -7,14 +7,14 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
+from ..cluster import RETRIES, connect, one_line_of
 from ..errors import AppError
 from ..workers import Failed, Gone, Made, Ready, Worker
-from .work import Record, Task, all_of_batch, code_digest
+from .work import Record, Task, all_of_batch
 
 __all__ = ["TASK_S", "ClusterPool", "LocalPool", "Pool", "Work"]
 
@@ -29,8 +29,6 @@ SIMPLER = "simplify the picture, or raise --icon-seconds"
 AHEAD = 3
 # Large pictures go in smaller batches, so that few of them are in memory at a time.
 BATCH_BYTES = 1 << 20
-CONNECT_S = 10.0
-RETRIES = 3
 
 
 @dataclass(frozen=True)
@@ -212,17 +210,7 @@ class ClusterPool(Pool):
     """
 
     def __init__(self, address: str) -> None:
-        try:
-            self._distributed: Any = import_module("distributed")
-        except ImportError:
-            raise AppError("--scheduler needs dask.distributed: pip install 'dotwave[cluster]'") from None
-        try:
-            self._client = self._distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise AppError(f"{address}: no dask scheduler answers: {_line(error)}; start one, or correct it") from None
-        if set(self._client.run(code_digest).values()) - {code_digest()}:
-            self._client.close(timeout=1)
-            raise AppError(f"{address}: a worker has another version of dotwave; install the same one everywhere")
+        self._distributed, self._client = connect(address)
         self.size = max(1, sum(self._client.nthreads().values()))
 
     def _finished(self, work: Work[Given], recipe: Given, batches: Iterable[tuple[Task, ...]]) -> Iterator[Ended]:
@@ -243,7 +231,7 @@ class ClusterPool(Pool):
             future = next(queue)
             submit()
             done = future.status == "finished"
-            problem = "" if done else _line(future.exception())
+            problem = "" if done else one_line_of(future.exception())
             yield Ended(running.pop(future.key), future.result() if done else None, problem)
             future.release()
 
@@ -251,7 +239,3 @@ class ClusterPool(Pool):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._client.close(timeout=1)
-
-
-def _line(problem: BaseException | None) -> str:
-    return "" if problem is None else f"{type(problem).__name__}: {' '.join(str(problem).split())}"[:300]

@@ -12,7 +12,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -43,7 +43,6 @@ __all__ = [
     "Record",
     "Task",
     "all_of_batch",
-    "code_digest",
     "encode_icons",
     "plan_patterns",
     "versions",
@@ -54,7 +53,6 @@ Floats = NDArray[np.float64]
 Record = dict[str, Any]
 Given = TypeVar("Given")
 
-PACKAGES = ("chainsim", "dotwave", "drivers", "encoders", "planner")
 # Digits kept of a similarity, and of a predicted error in units of full scale.
 DIGITS = 6
 
@@ -62,16 +60,6 @@ DIGITS = 6
 def versions() -> str:
     """What the numbers of an icon hang on beside its recipe: what was made with others is not used."""
     return f"plans {PLANS_VERSION}, pictures {PICTURES_VERSION}, waveforms {WAVEFORMS_VERSION}"
-
-
-@cache
-def code_digest() -> str:
-    """Digest of the code that does the work: machines that share it must have the same."""
-    digest = hashlib.sha256()
-    root = Path(__file__).parents[2]
-    for path in (path for one in PACKAGES for path in sorted((root / one).rglob("*.py"))):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)

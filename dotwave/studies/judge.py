@@ -152,11 +152,12 @@ class Judge:
         return YieldReport(float(devices[0].mean()), spread.wanted, asked, needed, spread.spread, spread.draws)
 
     def _required(self, device: Device, tol: float) -> Requirement:
-        from planner import assumed, require
+        from chainsim import surroundings_of
+        from planner import require
 
         frames = [frame for frame in self._frames if frame is not self._last]
         last = [] if self._last is None else [self._last]
-        return require([*frames, *last], device, assumed(device), tol=tol)
+        return require([*frames, *last], device, surroundings_of(device), tol=tol)
 
     def _reached(self, device: Device) -> tuple[tuple[str, ...], bool]:
         from planner import questions_of, seconds_words

@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chainsim import Device, load_device
+from chainsim import Device, load_device, surroundings_of
 from encoders import Scene, TargetPattern, TextOptions, encode_text
 from planner import Plan, plan_scene
 
@@ -85,10 +85,10 @@ class ExplainReport:
 
 def explain(source: str, *, device: str | None, tol: float) -> ExplainReport:
     """Which terms of the model a scene needs on a device, to a tolerance relative to the largest amplitude."""
-    from planner import assumed, require
+    from planner import require
 
     _, plan = planned(source, device)
-    return ExplainReport(require(plan.frames, plan.device, assumed(plan.device), tol=tol))
+    return ExplainReport(require(plan.frames, plan.device, surroundings_of(plan.device), tol=tol))
 
 
 @dataclass(frozen=True)

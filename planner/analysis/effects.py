@@ -13,11 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Closure
+from chainsim import ActuatorSpread, Chain, Closure, HigherMode, Surroundings
 
 from ..operating_point import OperatingPoint, PointTone
-from ..robustness.spread import RelativeSpread
-from ..surroundings import HigherMode, Surroundings
 
 __all__ = ["Linearisation", "pattern_error"]
 
@@ -120,8 +118,13 @@ class Linearisation:
             found.append(self.moved(line, 0.75 * beta * np.conj(motion) ** 2 * third))
         return found
 
-    def pressed(self, preload: float) -> list[Complexes]:
-        """What a constant force on the first actuator does."""
+    def pressed(self, around: Surroundings) -> list[Complexes]:
+        """What a fingertip does: a constant force on the first actuator, stiffness and damping on every one."""
+        stiff, damping = around.touch_stiffness, around.touch_damping
+        held = [self.moved(line, -(stiff + 1j * damping * line.omega) * line.phasor) for line in self.lines]
+        return [one + other for one, other in zip(self._preloaded(around.preload), held, strict=True)]
+
+    def _preloaded(self, preload: float) -> list[Complexes]:
         push = np.zeros(self.chain.n, np.complex128)
         push[0] = preload
         if not self.moving:
@@ -141,7 +144,7 @@ class Linearisation:
         for line in self.lines:
             force = self.electric(line)
             size = np.maximum(np.abs(force), 1e-300)
-            share = np.minimum(around.hysteresis, SQUARE * around.saturation / size)
+            share = np.minimum(around.hysteresis, SQUARE * around.largest_loop / size)
             found.append(self.moved(line, -share * force))
         return found
 
@@ -191,14 +194,14 @@ class Linearisation:
             found.append(self.moved(line, force))
         return found
 
-    def scattered(self, spread: RelativeSpread, phased: NDArray[np.bool_]) -> Floats:
+    def scattered(self, spread: ActuatorSpread, phased: NDArray[np.bool_]) -> Floats:
         """Standard deviation of each actuator's amplitude, or of its phasor where `phased`; float64, shape (n,)."""
         total, chain = np.zeros(self.chain.n), self.chain
         for line in self.lines:
             cubic = (0.75 if line.omega else 1.0) * chain.betas * np.abs(line.phasor) ** 2 * line.phasor
             causes = (
-                2 * spread.f0 * chain.stiffness * line.phasor,
-                1j * spread.delta * chain.deltas * line.omega * line.phasor,
+                2 * spread.frequency * chain.stiffness * line.phasor,
+                1j * spread.damping * chain.deltas * line.omega * line.phasor,
                 spread.beta * cubic,
                 spread.lam * self.lam * (np.roll(line.phasor, 1) - line.phasor),
             )

@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chainsim import ActuatorSpread
+
 from ..errors import PlanError
-from ..robustness.spread import RelativeSpread
 
 __all__ = ["SIGMA", "ParetoError", "ParetoFront", "ParetoPoint", "front_of"]
 
 Floats = NDArray[np.float64]
 
-SIGMA = RelativeSpread(f0=0.01)
+SIGMA = ActuatorSpread(frequency=0.01)
 # Differences below this share, or this size (time, drive, error, spread, gain), are none: a front of measured numbers
 # would otherwise keep everything.
 ALIKE = 0.02

@@ -49,7 +49,7 @@ def ways_of_deflections(wishes: Floats, device: Device) -> tuple[list[ParetoPoin
         drive = max(_peak(ramp.bias) for ramp in ramps) / device.bias_max
         slew = max(_peak(ramp.bias_slope) for ramp in ramps) / device.bias_per_volt / device.amplifier.slew_v_per_s
         if drive <= 1 and slew <= 1:
-            ringing = 2 * SIGMA.f0 * float(wishes.max()) * _at_resonance(periods)
+            ringing = 2 * SIGMA.frequency * float(wishes.max()) * _at_resonance(periods)
             spread = math.hypot(still, ringing)
             points.append(ParetoPoint(0.0, way.ramp_s, math.inf, error, error, drive, 1.0, spread))
     return points, len(PERIODS)

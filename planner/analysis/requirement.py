@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import DEFLECTION, RUNGS, TERMS as STEADY_TERMS, VIBRATION, Device, load_rung
+from chainsim import DEFLECTION, RUNGS, TERMS as STEADY_TERMS, VIBRATION, Device, Surroundings, load_rung
 
 from ..errors import PlanError
 from ..plan import FramePlan
-from ..surroundings import Surroundings
 from .scene_effects import TERMS, SceneEffects
 
 __all__ = ["TERMS", "Requirement", "RequirementError", "Term", "require"]
@@ -177,7 +176,7 @@ def _why(name: str, seen: SceneEffects) -> str:
         way = "a closed form, nothing is integrated" if not moving else "followed by its envelope"
         return f"the way in takes up to {100 * seen.ramp_share:.0f} % of a frame; {way}."
     if name == "preload":
-        return f"a constant force of {around.preload:g}." if around.preload else "no fingertip presses."
+        return _fingertip(around)
     if name == "hysteresis":
         return f"the piezo's loop takes up to {100 * around.hysteresis:.2g} % of every force; calibration absorbs most."
     if name == "creep":
@@ -192,9 +191,18 @@ def _why(name: str, seen: SceneEffects) -> str:
     if name == "2-D coupling":
         return f"rows are coupled by {around.row_lam:g}." if around.row_lam else "no link joins two rows."
     if name == "amplifier dynamics":
-        return f"{around.bandwidth_hz:.3g} Hz of bandwidth for a drive near {device.f0_hz:.3g} Hz." if moving else (
+        return f"{around.bandwidth:.3g} Hz of bandwidth for a drive near {device.f0_hz:.3g} Hz." if moving else (
             "a constant voltage passes any bandwidth."
         )  # fmt: skip
-    return f"natural frequencies differ by {100 * around.spread.f0:.2g} % (1 sigma), a resonance is " + (
+    return f"natural frequencies differ by {100 * around.spread.frequency:.2g} % (1 sigma), a resonance is " + (
         f"{100 * device.delta:.2g} % wide."
+    )
+
+
+def _fingertip(around: Surroundings) -> str:
+    if not (around.preload or around.touch_stiffness or around.touch_damping):
+        return "no fingertip presses."
+    more = f"{around.touch_stiffness:g} more stiffness and {around.touch_damping:g} more damping on every actuator"
+    return f"a constant force of {around.preload:g}" + (
+        f", {more}." if around.touch_stiffness or around.touch_damping else "."
     )

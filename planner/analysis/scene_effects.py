@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Device
+from chainsim import Device, Surroundings
 
 from ..operating_point import OperatingPoint
 from ..plan import FramePlan
-from ..surroundings import Surroundings
 from .effects import Linearisation, pattern_error
 
 __all__ = ["TERMS", "SceneEffects"]
@@ -111,11 +110,11 @@ class SceneEffects:
         known = key, 0.0 if state.moving else end_s
         if known not in self._alone:
             chain, around, device = self._standing[key], self.around, self.device
-            bandwidth = around.bandwidth_hz / device.f0_hz
+            bandwidth = around.bandwidth / device.f0_hz
             self._alone[known] = {
                 "nonlinearity": chain.without_cubic(),
                 "third harmonic": chain.without_third(),
-                "preload": chain.pressed(around.preload),
+                "preload": chain.pressed(around),
                 "hysteresis": chain.with_hysteresis(around),
                 "creep": chain.creeping(around, device.tau_per_s, end_s),
                 "higher modes": chain.with_modes(around.modes),
@@ -179,8 +178,8 @@ class SceneEffects:
         rate = float(STEPS)
         if "higher modes" in wanted:
             rate = max([rate, *(mode.omega for mode in self.around.modes)])
-        if "amplifier dynamics" in wanted and math.isfinite(self.around.bandwidth_hz):
-            rate = max(rate, self.around.bandwidth_hz / self.device.f0_hz)
+        if "amplifier dynamics" in wanted and math.isfinite(self.around.bandwidth):
+            rate = max(rate, self.around.bandwidth / self.device.f0_hz)
         return STAGES * rate * EFOLDS * (1 + self.device.chain_length) / self.device.delta
 
 

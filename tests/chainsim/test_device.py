@@ -8,7 +8,7 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from chainsim import Closure, Device, ProfileError, device_names, load_device
+from chainsim import Closure, Device, ProfileError, assumed_of, device_names, load_device, surroundings_of
 from chainsim.model.calibrated import Actuator
 
 
@@ -193,3 +193,52 @@ def test_a_copy_with_other_actuators_forgets_those_before() -> None:
     assert fresh == device
     assert fresh.as_dict() == device.as_dict()
     assert fresh.model_dump_json() == device.model_dump_json()
+
+
+@pytest.mark.parametrize("name", device_names())
+def test_surroundings_of_the_profiles_are_what_is_assumed_without_the_section(name: str) -> None:
+    device = load_device(name)
+    assert device.surroundings is not None
+    bare = Device.model_validate(device.as_dict() | {"surroundings": None, "notes": {}})
+    assert "surroundings" not in bare.as_dict()
+    told, assumed = surroundings_of(device), surroundings_of(bare)
+    rest = {"modes": (), "saturation": None}
+    assert told.model_copy(update=rest) == assumed.model_copy(update=rest)
+    assert told.saturation == pytest.approx(assumed.saturation)
+    for one, other in zip(told.modes, assumed.modes, strict=True):
+        assert (one.omega, one.delta, one.gain) == pytest.approx((other.omega, other.delta, other.gain), rel=1e-4)
+    assert assumed_of(device) == assumed_of(bare)
+    assert {"hysteresis", "creep_per_decade", "modes", "bandwidth_hz", "spread"} <= set(assumed_of(device))
+
+
+def test_what_is_measured_of_the_surroundings_is_not_assumed() -> None:
+    notes = {
+        "surroundings": {"assumed": True, "why": "?"},
+        "surroundings.hysteresis": {"assumed": False, "why": "A loop at 50 V."},
+    }
+    section = {"hysteresis": 0.08, "bandwidth_hz": 5000.0}
+    plain = load_device("linked-6x6").as_dict()
+    device = Device.model_validate(plain | {"surroundings": section, "notes": notes})
+    assert assumed_of(device) == ("bandwidth_hz",)
+    around = surroundings_of(device)
+    assert (around.hysteresis, around.bandwidth, around.largest_loop, around.modes) == (0.08, 5000.0, np.inf, ())
+    # The spread that plans count on is what the devices have.
+    spread = {"frequency": 0.002}
+    told = Device.model_validate(plain | {"surroundings": section, "spread": spread, "notes": notes})
+    assert surroundings_of(told).spread == told.spread
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ({"hysteresis": 1.0}, "surroundings.hysteresis"),
+        ({"saturation": 0}, "surroundings.saturation"),
+        ({"modes": [{"omega": 0, "delta": 0.1, "gain": 1}]}, "surroundings.modes.0.omega"),
+        ({"noise": 1e-5}, "surroundings.noise"),
+        ({"converter_bits": 1}, "surroundings.converter_bits"),
+        ({"amplifier_noise": -1}, "surroundings.amplifier_noise"),
+    ],
+)
+def test_surroundings_are_read_strictly(section: dict[str, object], words: str) -> None:
+    with pytest.raises(ValidationError, match=words.replace("surroundings.", "")):
+        Device.model_validate(load_device("linked-6x6").as_dict() | {"surroundings": section})

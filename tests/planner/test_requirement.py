@@ -8,7 +8,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chainsim import Chain, Closure, Device, GridIntegrator, Outcome, Setting, load_device, solve
+from chainsim import (
+    ActuatorSpread,
+    Chain,
+    Closure,
+    Device,
+    GridIntegrator,
+    HigherMode,
+    Outcome,
+    Setting,
+    Surroundings,
+    load_device,
+    solve,
+    surroundings_of,
+)
 from chainsim.effects.effects import AmplifierDynamics, BoucWen, Creep, Mode, Terms, bending_modes
 from chainsim.effects.ode import integrate_terms
 from encoders import Frame, GridShape, Scene, TargetPattern, TextOptions, TextSource, encode_text
@@ -16,7 +29,6 @@ from planner import FramePlan, OperatingPoint, PointTone, RelativeSpread, plan_s
 from planner.analysis.effects import Linearisation
 from planner.analysis.requirement import Requirement, RequirementError, require
 from planner.analysis.scene_effects import TERMS
-from planner.surroundings import HigherMode, Surroundings, assumed
 from planner.transitions.check import Way
 from tests.support.known import known
 
@@ -55,7 +67,7 @@ def effects(device, states, around=NOTHING, *, tol=1e-3, **frame):
 
 def terms_of(around, names, device):
     """The simulator's terms for those names."""
-    loop = around.hysteresis / around.saturation if around.saturation < math.inf else 0.0
+    loop = around.hysteresis / around.largest_loop if around.largest_loop < math.inf else 0.0
     first = around.creep_first_s * device.tau_per_s
     return Terms(
         hysteresis=BoucWen(around.hysteresis, 0.75 * loop, 0.25 * loop) if "hysteresis" in names else None,
@@ -138,8 +150,9 @@ def random_surroundings(rng, device, force):
     return Surroundings(
         preload=size(1e-5, 1e-1), hysteresis=size(1e-6, 1e-1), saturation=force * size(1e-2, 10),
         creep_per_decade=size(1e-6, 1e-1), creep_first_s=size(10, 100) / device.tau_per_s,
-        modes=(HigherMode(4.965, 5 * device.delta, size(1e-6, 3)),), bandwidth_hz=device.f0_hz * size(1, 50),
-        spread=RelativeSpread(f0=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
+        modes=(HigherMode(omega=4.965, delta=5 * device.delta, gain=size(1e-6, 3)),),
+        bandwidth_hz=device.f0_hz * size(1, 50),
+        spread=ActuatorSpread(frequency=size(1e-6, 1e-2)), row_lam=size(1e-6, 1e-1) if device.rows > 1 else 0.0,
     )  # fmt: skip
 
 
@@ -151,7 +164,7 @@ def left_out_matters(seed, shapes):
     duration = 2 * (12 + 3 * device.chain_length) / device.delta
     frame = frame_of(device, states, held_s=duration / device.tau_per_s)
     found = require([frame], device, around, tol=tol)
-    factors = (1 + around.spread.f0 * rng.standard_normal(device.chain_length * device.rows)) ** 2
+    factors = (1 + around.spread.frequency * rng.standard_normal(device.chain_length * device.rows)) ** 2
     full, work = integrated(device, states, around, frozenset(TERMS), factors=factors, duration=duration)
     if found.included & {"hysteresis", "creep", "higher modes", "amplifier dynamics"}:
         kept, less = integrated(device, states, around, found.included, factors=factors, duration=duration)
@@ -239,6 +252,27 @@ def test_a_small_force_moves_the_motion_as_the_simulator_says(closure):
     assert standing.moved(standing.lines[0], force) == pytest.approx(after - before, rel=5e-3, abs=1e-9)
 
 
+def told(spread):
+    return ActuatorSpread(frequency=spread.f0, damping=spread.delta, beta=spread.beta, lam=spread.lam)
+
+
+def test_a_fingertip_stiffens_damps_and_presses():
+    """A linear chain under each alone: what is felt changes as the equations with it say."""
+    device = device_of(3, beta=0.0)
+    setting = Setting.of(device.chain, epsilon=0.004, lam=0.2, omega=1.1)
+    state = held(device, setting)
+    for name, value in (("touch_stiffness", 1e-4), ("touch_damping", 1e-4)):
+        chain = Chain.of(
+            3, beta=0.0, delta=device.delta + (value if name == "touch_damping" else 0.0),
+            stiffness=1.0 + (value if name == "touch_stiffness" else 0.0),
+        )  # fmt: skip
+        touched = np.abs(solve(chain, setting, tol=1e-9, rung="auto", start="rest").phasor[0])
+        off = np.abs(touched - np.abs(state.phasor)).max() / np.abs(state.phasor).max()
+        estimate = effects(device, [state], Surroundings.model_validate({name: value}))["preload"]
+        assert estimate / 2 == pytest.approx(off, rel=0.03)
+    assert effects(device, [state])["preload"] == 0.0
+
+
 def test_spread_is_what_draws_scatter_by():
     device, state = vibrating(amplitude=0.05, device=device_of(4, rows=1))
     for spread in (
@@ -247,7 +281,7 @@ def test_spread_is_what_draws_scatter_by():
         RelativeSpread(beta=1e-3),
         RelativeSpread(lam=1e-4),
     ):
-        sigma = effects(device, [state], Surroundings(spread=spread))["spread"] / 2
+        sigma = effects(device, [state], Surroundings(spread=told(spread)))["spread"] / 2
         report = spread_of(device, [state], spread, tolerance=1.0, threshold=0.5, count=4000)
         worst = report.error * device.full_scale / np.abs(state.phasor).max()
         # The worst of four actuators, of which one scatters most.
@@ -345,22 +379,21 @@ def test_an_amplifier_only_turns_what_all_actuators_share():
 
 def test_nothing_around_and_nothing_shown_require_nothing():
     device, state = resting([0.0, 0.0, 0.0])
-    found = require([frame_of(device, [state])], device, assumed(device), tol=1e-9)
+    found = require([frame_of(device, [state])], device, surroundings_of(device), tol=1e-9)
     assert found.included == frozenset()
     assert found.left_out == 0.0
 
 
 def test_what_is_assumed_is_the_papers_beam():
     modes = bending_modes(133.13, (661.03, 1258.3), delta=LINKED.delta)
-    for ours, theirs in zip(assumed(LINKED).modes, modes, strict=True):
-        assert (ours.omega, ours.delta) == (theirs.omega, theirs.delta)
-        assert ours.gain == pytest.approx(theirs.gain, rel=1e-4)
+    for ours, theirs in zip(surroundings_of(LINKED).modes, modes, strict=True):
+        assert (ours.omega, ours.delta, ours.gain) == pytest.approx((theirs.omega, theirs.delta, theirs.gain), rel=1e-4)
 
 
 def test_the_selection_is_monotone_in_the_tolerance():
     device, state = vibrating()
     frame = frame_of(device, [state])
-    found = [require([frame], device, assumed(device), tol=tol) for tol in (1e-6, 1e-4, 1e-2, 1.0, 1e3)]
+    found = [require([frame], device, surroundings_of(device), tol=tol) for tol in (1e-6, 1e-4, 1e-2, 1.0, 1e3)]
     for strict, loose in pairwise(found):
         assert loose.included <= strict.included
         assert loose.work <= strict.work <= strict.work_of_all
@@ -371,7 +404,7 @@ def test_the_selection_is_monotone_in_the_tolerance():
 
 def test_the_table_names_every_term_and_is_plain_json():
     device, state = vibrating()
-    found = require([frame_of(device, [state])], device, assumed(device), tol=1e-2)
+    found = require([frame_of(device, [state])], device, surroundings_of(device), tol=1e-2)
     assert isinstance(found, Requirement)
     text = found.as_text()
     assert all(f"{name} " in text for name in TERMS)

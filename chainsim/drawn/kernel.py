@@ -1,0 +1,196 @@
+"""The kernel that moves one chain of WIDTH devices side by side, with what acts on them beside the chain's equation.
+
+The composition is that of `grid_kernels`: oscillator and modes are flows, solved exactly; at every kick all positions
+stand still, so the tips, the links, the electric force, its hysteresis and the cubic term are known. Play operators are
+pushed at the end of every step, so corners cost an error of second order. Creep, slow beside a sample, is taken by the
+midpoint rule once a sample. An effect that is off has weights of 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..equations.composition import FLOWS, KICK_TIMES, KICKS
+from ..inlined import inlined
+from ..time_domain.splitting import flow
+from .lanes import (
+    BETA_RUN,
+    FLOWS_AT,
+    GAIN_RUN,
+    RUNS,
+    TIP_RUN,
+    WIDTH,
+    add,
+    arrive,
+    copy,
+    creep,
+    flow_all,
+    hiss,
+    kick_all,
+    push_all,
+)
+
+__all__ = ["ChainSamples", "Shared", "advance_drawn", "flows_of_step"]
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Seeds = NDArray[np.uint64]
+
+_SHARE = RUNS * WIDTH
+_CHECKED = 16
+"""Samples from one look for escapes to the next; beyond the limit a motion is not finite a few samples later."""
+
+
+class Shared(NamedTuple):
+    """What all devices have in common.
+
+    dtau, substeps, limit : of `grid_kernels.Chains`.
+    ring : whether the last actuator feeds the first.
+    preload : on the first actuator.
+    piezo : float64, shape (11,), base and weights of `effects.Play` together, its radii, its weights, and the gains of
+        the modes.
+    mode_flows : float64, shape (2, 4, 3), coefficients of the modes' four distinct flows.
+    slow : whether there are plays or creep.
+    creep_steps : float64, shape (7,), share of the way to its end that each relaxation goes in a sample.
+    creep_gain : of each.
+    """
+
+    dtau: float
+    substeps: int
+    limit: float
+    ring: bool
+    preload: float
+    piezo: Floats
+    mode_flows: Floats
+    slow: bool
+    creep_steps: Floats
+    creep_gain: float
+
+
+class ChainSamples(NamedTuple):
+    """One chain's share of a block of samples; row 0 is the last sample before the block.
+
+    force, lam : float64, shape (S + 1, n).
+    noise : float64, shape (n,), rms of a force.
+    channel : int64, shape (n,), the number of each actuator, of `channels`, for its noise.
+    first : number of the block's first sample.
+    frame : int64, shape (S,), the frame a sample counts for, -1 for none.
+    basis : float64, shape (S, K), its weights.
+    """
+
+    force: Floats
+    lam: Floats
+    noise: Floats
+    channel: Whole
+    channels: int
+    first: int
+    frame: Whole
+    basis: Floats
+
+
+@compiled
+def flows_of_step(delta: Floats, stiffness: Floats, step: float) -> Floats:
+    """The four distinct flows of a step: float64, shape (4, 3, N) for N oscillators."""
+    found = np.empty((4, 3, len(delta)))
+    for i in range(len(delta)):
+        for k in range(4):
+            found[k, 0, i], found[k, 1, i], found[k, 2, i] = flow(delta[i], stiffness[i], FLOWS[k] * step)
+    return found
+
+
+@inlined
+def _step(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared) -> None:
+    n, h, modes = given.force.shape[1], shared.dtau / shared.substeps, shared.mode_flows
+    for m in range(n):
+        here = (m + 1) * _SHARE
+        own = work[here + FLOWS_AT : here + FLOWS_AT + 3 * WIDTH]
+        flow_all(work[here : here + FLOWS_AT], own, modes[0, 0], modes[1, 0])
+    for k in range(7):
+        at, b = (sub + KICK_TIMES[k]) / shared.substeps, KICKS[k] * h
+        # The eight flows of a step are the four distinct ones, there and back.
+        after = k + 1 if k < 3 else 6 - k
+        if shared.ring:
+            copy(work[:WIDTH], work[n * _SHARE : (n + 1) * _SHARE])
+        # From the last one on, so that each finds the tip before it where it was.
+        for m in range(n - 1, -1, -1):
+            here = (m + 1) * _SHARE
+            force = given.force[s, m] + at * (given.force[s + 1, m] - given.force[s, m])
+            lam = given.lam[s, m] + at * (given.lam[s + 1, m] - given.lam[s, m])
+            flows_at, before = here + FLOWS_AT + 3 * WIDTH * after, here - _SHARE + TIP_RUN * WIDTH if m else 0
+            kick_all(
+                work[here : here + FLOWS_AT], work[before : before + WIDTH], work[flows_at : flows_at + 3 * WIDTH], at,
+                force, lam, b, shared.preload if m == 0 else 0.0, shared.piezo, modes[0, after], modes[1, after],
+            )  # fmt: skip
+
+
+@inlined
+def _settle(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared) -> None:
+    """Push the plays at the end of a step; at the end of a sample let creep follow."""
+    n, at = given.force.shape[1], (sub + 1) / shared.substeps
+    if shared.ring:
+        copy(work[:WIDTH], work[n * _SHARE : (n + 1) * _SHARE])
+    for m in range(n):
+        here, made = (m + 1) * _SHARE, work[WIDTH : 2 * WIDTH]
+        row, before = work[here : here + FLOWS_AT], here - _SHARE + TIP_RUN * WIDTH if m else 0
+        force = given.force[s, m] + at * (given.force[s + 1, m] - given.force[s, m])
+        lam = given.lam[s, m] + at * (given.lam[s + 1, m] - given.lam[s, m])
+        push_all(row, work[before : before + WIDTH], made, at, force, lam, shared.piezo)
+        if shared.creep_gain != 0.0 and sub + 1 == shared.substeps:
+            creep(row, made, shared.creep_steps, shared.creep_gain)
+
+
+@inlined
+def _check(work: Floats, n: int, limit: float, sample: int, escaped: Whole) -> None:
+    """A chain that has passed `limit` lies still from then on."""
+    for w in range(WIDTH):
+        gone = False
+        for m in range(1, n + 1):
+            gone = gone or not abs(work[m * _SHARE + w]) <= limit
+        if gone:
+            escaped[w] = min(escaped[w], sample)
+            work[w] = 0.0
+            for m in range(1, n + 1):
+                for run in range(FLOWS_AT // WIDTH):
+                    # The gain of its link and beta stay; whether it moves does not.
+                    if run not in (GAIN_RUN, BETA_RUN):
+                        work[m * _SHARE + run * WIDTH + w] = 0.0
+
+
+@compiled
+def advance_drawn(
+    work: Floats, seeds: Seeds, given: ChainSamples, shared: Shared, load: Floats, escaped: Whole
+) -> None:
+    """Move one chain of WIDTH devices through a block of samples.
+
+    Parameters
+    ----------
+    work : float64, shape ((n + 1) RUNS WIDTH,), the chain's own share, then the actuators'; changed in place.
+    seeds : uint64, shape (WIDTH,), of each device's noise.
+    load : float64, shape (frames, n, K, WIDTH): `basis` times the tips is added for every sample.
+    escaped : int64, shape (WIDTH,), lowered to the sample at which a device has been seen to escape.
+    """
+    n = given.force.shape[1]
+    for s in range(len(given.frame)):
+        sample = given.first + s
+        for m in range(n):
+            if given.noise[m] > 0.0:
+                row = work[(m + 1) * _SHARE : (m + 1) * _SHARE + FLOWS_AT]
+                hiss(row, seeds, sample * given.channels + given.channel[m], given.noise[m])
+        for sub in range(shared.substeps):
+            _step(work, sub, s, given, shared)
+            if shared.slow:
+                _settle(work, sub, s, given, shared)
+        for m in range(n):
+            if given.noise[m] > 0.0:
+                arrive(work[(m + 1) * _SHARE : (m + 1) * _SHARE + FLOWS_AT])
+        if sample % _CHECKED == 0:
+            _check(work, n, shared.limit, sample, escaped)
+        if given.frame[s] >= 0:
+            for m in range(n):
+                row = work[(m + 1) * _SHARE : (m + 1) * _SHARE + FLOWS_AT]
+                for k in range(given.basis.shape[1]):
+                    add(load[given.frame[s], m, k], given.basis[s, k], row)

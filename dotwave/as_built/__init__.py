@@ -1,0 +1,3 @@
+"""What a written waveform makes felt on many devices as they are built."""
+
+__all__: list[str] = []
