@@ -139,7 +139,8 @@ class _Frames:
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
         times = start_s, start_s + longest, end_s
-        residue = self._left(change, start_s, longest, end_s - start_s)
+        # After the way out nothing is to be felt any more.
+        residue = 0.0 if frame is None else self._left(change, start_s, longest, end_s - start_s)
         whole = self._judged(
             FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue)
         )
@@ -168,7 +169,7 @@ class _Frames:
             if ramp is not None and ramp.lacking:
                 note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
                 return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-        if plan.frame is not None and plan.residue > AMPLITUDE_ERROR_LIMIT:
+        if plan.residue > AMPLITUDE_ERROR_LIMIT:
             note = (
                 f"{self._device.name} cannot change to this pattern: what changes leave rings on at "
                 f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "

@@ -160,3 +160,12 @@ def test_a_profile_without_surroundings_is_written_as_before() -> None:
     written = json.loads(json.dumps(stated.as_dict()))
     assert written["surroundings"]["amplifier_noise"] == 1e-5
     assert Device.model_validate(written) == stated
+
+
+def test_what_rings_after_the_way_out_is_no_error() -> None:
+    raised = np.zeros((6, 6))
+    raised[1:3] = 1.0
+    mixed = np.random.default_rng(3).integers(0, 2, (6, 6)).astype(float)
+    *_, out = planned([raised, mixed], dwell_s=1.0)
+    assert out.frame is None
+    assert out.error == 0.0
