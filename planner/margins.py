@@ -42,14 +42,14 @@ def lacking_of(margins: Margins) -> str:
     return ""
 
 
-def noise_error(device: Device, point: OperatingPoint) -> float:
+def noise_error(device: Device, point: OperatingPoint, *, rounding: bool = True) -> float:
     """Standard deviation of the worst actuator's amplitude under the noise of the amplifier, dimensionless.
 
-    That is what its converter rounds, and what it adds itself (`surroundings.amplifier_noise`), spread evenly. Rounding
-    adds noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error feedback,
+    That is what it adds itself (`surroundings.amplifier_noise`), spread evenly, and with `rounding` what its converter
+    rounds: noise of step^2/12, spread up to half the rate as |2 sin(omega dtau / 2)|^4 (second-order error feedback,
     `drivers.Waveform`). Small motions pass both on stage by stage.
     """
-    step = device.amplifier.volt_step * device.epsilon_per_volt
+    step = device.amplifier.volt_step * device.epsilon_per_volt if rounding else 0.0
     added = 0.0 if device.surroundings is None else device.surroundings.amplifier_noise * device.epsilon_max
     if not (step or added):
         return 0.0
