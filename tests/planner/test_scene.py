@@ -63,8 +63,9 @@ def test_the_time_line(device: Device, dwells: list[float], seed: int) -> None:
         longest = max((ramp.duration_s for ramp in plan.ramps if ramp is not None), default=0.0)
         assert plan.settled_s == plan.start_s + longest
         assert plan.settled_s < plan.end_s
-        assert plan.outcome is Outcome.OK
-        assert plan.note == ""
+        # Rows of dots alike, soon after others, ring on for too long.
+        rings = "what changes leave rings on" in plan.note
+        assert (plan.outcome, plan.note) == (Outcome.OK, "") or (plan.outcome is Outcome.UNREACHABLE and rings)
     for plan, wanted in zip(plans, frames, strict=False):
         assert plan.frame is wanted
         assert plan.end_s - plan.start_s == pytest.approx(wanted.dwell_s, abs=0.51 / rate)

@@ -37,7 +37,7 @@ JOB = """\
 device: linked-6x6
 output: %s
 sequence:
-  - text: {say: "%s", dwell_s: 0.6}
+  - text: {say: "%s", dwell_s: 1}
   - texture: {bars: {vertical: false, width: 2, gap: 1}, dwell_s: 1}
   - pause_s: 0.5
 """
