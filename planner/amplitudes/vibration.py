@@ -220,7 +220,7 @@ class Vibration(AmplitudeFamily):
     def _known(
         self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]
     ) -> list[Ramp | None]:
-        """With what they leave, where they can be gone; an actuator alone has nothing behind it that would magnify it."""
+        """With what they leave, where they can be gone; behind an actuator alone nothing magnifies it."""
         known = list(ramps)
         gone = [(i, ramp) for i, ramp in enumerate(ramps) if ramp is not None and not ramp.lacking]
         if gone and self.device.chain_length > 1:

@@ -39,7 +39,7 @@ output: %s
 sequence:
   - text: {say: "%s", dwell_s: 1}
   - texture: {bars: {vertical: false, width: 2, gap: 1}, dwell_s: 1}
-  - pause_s: 0.5
+  - pause_s: 1
 """
 KILLS_A_ROUND = 5
 
