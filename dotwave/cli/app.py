@@ -7,7 +7,6 @@ SIGTERM. Imports that take time stay inside the commands.
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -38,11 +37,10 @@ from .command import (
     Yes,
     Yield,
     finish as _finish,
-    say,
 )
-from .completion import completed_devices, completed_files, completed_texts
+from .completion import completed_devices, completed_texts
 from .ending import ended
-from .help import LOOK, RENDER, SET_UP, STUDY, Commands
+from .help import LOOK, RENDER, SET_UP, Commands
 from .options import Dots, SampleFormat
 
 __all__ = ["app", "application", "main"]
@@ -144,36 +142,6 @@ def text(
     profile = device_of(device)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)
-
-
-@app.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
-def simulate(
-    chain: Annotated[
-        str,
-        typer.Argument(
-            metavar="CHAIN.yaml",
-            help="The chain, its setting and a tolerance; - is stdin.",
-            autocompletion=completed_files(".yaml", ".yml"),
-        ),
-    ],
-    as_json: Annotated[bool, typer.Option("--json", help="As without it: the answer is JSON.")] = False,
-) -> None:
-    """Solve a chain of coupled oscillators and print what it does, as JSON.
-
-    The file says `chain`, `setting`, `rung`, `tol` and `start`; samples/chains has some to copy. The exit code
-    is 1 when the outcome is not ok; the JSON is printed all the same.
-
-    \b
-    Example:
-      dotwave simulate chain.yaml
-    """
-    from chainsim import simulate as solve
-
-    from ..source import simulation_source
-
-    answer = solve(simulation_source(chain))
-    say(json.dumps(answer, allow_nan=False))
-    raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
 
 
 @app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)

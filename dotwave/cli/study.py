@@ -2,18 +2,49 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .command import Device, Json, finish
+from .command import Device, Json, finish, say
 from .completion import completed_files
 from .help import STUDY
 
 __all__ = ["commands"]
 
 commands = typer.Typer(rich_markup_mode=None)
+
+
+@commands.command(short_help="Solve one chain and print its steady state.", rich_help_panel=STUDY)
+def simulate(
+    chain: Annotated[
+        str,
+        typer.Argument(
+            metavar="CHAIN.yaml",
+            help="The chain, its setting and a tolerance; - is stdin.",
+            autocompletion=completed_files(".yaml", ".yml"),
+        ),
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="As without it: the answer is JSON.")] = False,
+) -> None:
+    """Solve a chain of coupled oscillators and print what it does, as JSON.
+
+    The file says `chain`, `setting`, `rung`, `tol` and `start`; samples/chains has some to copy. The exit code
+    is 1 when the outcome is not ok; the JSON is printed all the same.
+
+    \b
+    Example:
+      dotwave simulate chain.yaml
+    """
+    from chainsim import simulate as solve
+
+    from ..source import simulation_source
+
+    answer = solve(simulation_source(chain))
+    say(json.dumps(answer, allow_nan=False))
+    raise typer.Exit(0 if answer["outcome"] == "ok" else 1)
 
 
 @commands.command(short_help="Solve one chain at many settings.", rich_help_panel=STUDY)
