@@ -21,6 +21,7 @@ from .files.parts import (
     PartFile as PartFile,
     is_at as is_at,
     part_of as part_of,
+    settle_alone as settle_alone,
 )
 from .files.whole import (
     atomic_file as atomic_file,

@@ -13,7 +13,7 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import Any
 
-from drivers import PartFile, held, is_at, part_of, settled
+from drivers import PartFile, held, is_at, part_of, settle_alone, settled
 
 from ..errors import AppError
 
@@ -55,13 +55,21 @@ def claimed(folder: Path, note: Mapping[str, Any]) -> Iterator[None]:
             if number is None or is_at(folder, number):
                 if _read(folder) != note:
                     raise AppError(f"{folder}: left by another sweep; finish that one, or delete the folder")
+                if number is not None:
+                    # Whoever writes into it would wait for the folder to be free, which it is not until we are done.
+                    with suppress(OSError):
+                        settle_alone(folder, _is_chunk, others=True)
                 yield
                 return
 
 
+def _is_chunk(name: str) -> bool:
+    return CHUNK.fullmatch(name) is not None
+
+
 def removed(folder: Path, firsts: range) -> None:
     """Delete the chunks that begin at `firsts`, then the folder; it stays when there is anything else in it."""
-    settled(folder / NOTE, lambda name: CHUNK.fullmatch(name) is not None)
+    settled(folder / NOTE, _is_chunk)
     for first in firsts:
         (folder / f"{first:012d}.npz").unlink(missing_ok=True)
     if os.listdir(folder) == [NOTE]:

@@ -7,9 +7,11 @@ import json
 import os
 import random
 import re
+import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,6 +128,17 @@ def test_a_folder_that_dotwave_did_not_make_is_refused_unharmed(
     assert tree(tmp_path) == before
 
 
+@pytest.fixture
+def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for a folder that is held: a sweep holds its own."""
+
+    def never(_: float) -> None:
+        raise AssertionError("waited for a folder that is held")
+
+    monkeypatch.setattr("drivers.files.locks.time", SimpleNamespace(monotonic=time.monotonic, sleep=never))
+
+
+@pytest.mark.usefixtures("no_waiting")
 def test_only_what_dotwave_put_there_is_removed(
     source: Path, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -140,6 +153,7 @@ def test_only_what_dotwave_put_there_is_removed(
     assert sorted(path.name for path in parts.iterdir()) == ["999999999999.npz", "folder", "thesis.txt"]
 
 
+@pytest.mark.usefixtures("no_waiting")
 def test_nothing_is_left_of_what_dead_runs_left(
     source: Path, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
