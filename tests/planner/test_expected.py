@@ -132,6 +132,7 @@ def test_known_rows_are_not_judged_again(monkeypatch: pytest.MonkeyPatch) -> Non
     assert counted == busy + 1
 
 
+@pytest.mark.slow
 def test_the_accuracy_needed_is_enough_and_twice_of_it_is_not() -> None:
     for pattern in (DOTS, LEVELS):
         needed = of(planned(spread(LINKED, 0.02), pattern)[0]).needed

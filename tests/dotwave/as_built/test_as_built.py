@@ -243,7 +243,8 @@ def test_the_command_line(dotwave: Callable[..., Any], tmp_path: Path, linked: P
         assert ended.err.strip().endswith(f"{option} belongs to --as-built; add that, or leave it out")
 
 
-def test_numbers_that_cannot_be_are_refused(linked: Path) -> None:
+def test_numbers_that_cannot_be_are_refused(linked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dotwave.cluster.CONNECT_S", 1.0)
     with pytest.raises(AppError, match="devices: expected 1 or more, got 0"):
         dw.verify(linked, devices=0)
     with pytest.raises(AppError, match="seed: expected 0 or more, got -1"):

@@ -130,6 +130,7 @@ def emulated(device: Device, plant: Path, link: Path) -> Iterator[None]:
         emulator.close()
 
 
+@pytest.mark.slow
 def test_a_device_is_tuned_over_a_port(tmp_path: Path) -> None:
     """Through protocol, sensors and full equations; more damping than usual, so that pages need not stand for long."""
     device = TWO.model_copy(update={"delta": 0.02})
