@@ -44,7 +44,6 @@ BITMAP = Weight(1, 1_000_000)
 # Squares that a rule, a declaration or a step from an element to its parent takes for each element of the document.
 STEP = 16
 
-_SELECTORS = re.compile(r"([^{}]*)\{")
 _COMBINATOR = re.compile(r"[\s>+~]+")
 
 
@@ -54,8 +53,8 @@ def weight_of_sheets(text: str, elements: int, depth: int) -> Weight:
     A selector of several parts is tried with every choice of the elements, `depth` at most, that an element is in.
     """
     steps = text.count(";")
-    for group in _SELECTORS.findall(text):
-        for selector in group.split(","):
+    for before in text.split("{")[:-1]:
+        for selector in before.rpartition("}")[2].split(","):
             parts = len(_COMBINATOR.split(selector.strip()))
             steps += sum(math.comb(depth, choice) for choice in range(min(parts, depth + 1)))
     return Weight(0, STEP * steps * elements)

@@ -243,6 +243,21 @@ def test_what_takes_long_is_refused_before_it_is_drawn(body: str) -> None:
         tame_svg("a", f"{HEAD}{body}</svg>".encode(), PictureLimits())
 
 
+@pytest.mark.parametrize("piece", ["url(", "/* ", "marker", "stroke-dash ", "filter ", "a{", "a", "1", ",", "@import "])
+@pytest.mark.parametrize("head", ["", "url(", "{"])
+def test_a_long_style_sheet_is_read_once(head: str, piece: str) -> None:
+    """Of a megabyte each; an expression that goes back to where it was takes hours."""
+    sheet = head + piece * (900_000 // len(piece))
+    with contextlib.suppress(PictureError):
+        tame_svg("a", f"{HEAD}<style>{sheet}</style>{DOT}</svg>".encode(), PictureLimits())
+
+
+def test_comments_hide_nothing_from_what_is_left_out() -> None:
+    sheet = "<style>path{stroke:#000;stroke-width:2;stroke-dasharray/* */:1,1}</style>"
+    text, _ = tame_svg("a", f"{HEAD}{sheet}{DOT}</svg>".encode(), PictureLimits())
+    assert "dash" not in text
+
+
 def test_bitmaps_have_a_bound_together() -> None:
     buffer = io.BytesIO()
     Image.new("1", (1500, 1500)).save(buffer, "PNG")
