@@ -17,7 +17,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks on 
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("x.wav", "x.json")
-ROUNDS = 300
 # Writes its own word into both files whenever it is told to. After every new name the other one gets its turn.
 WRITER = """
 import os, sys
@@ -58,7 +57,8 @@ def words(folder: Path) -> set[bytes]:
     return {(folder / name).read_bytes() for name in NAMES}
 
 
-def test_two_writers_at_once_leave_the_files_of_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rounds", [30, pytest.param(300, marks=pytest.mark.slow)])
+def test_two_writers_at_once_leave_the_files_of_one(rounds: int, tmp_path: Path) -> None:
     writers = [
         subprocess.Popen(
             [sys.executable, "-c", WRITER, str(tmp_path), word], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -67,7 +67,7 @@ def test_two_writers_at_once_leave_the_files_of_one(tmp_path: Path) -> None:
         for word in ("one", "other")
     ]  # fmt: skip
     seen = set()
-    for number in range(ROUNDS):
+    for number in range(rounds):
         for writer in writers:
             known(writer.stdin).write(f" {number}\n")
             known(writer.stdin).flush()
@@ -77,7 +77,7 @@ def test_two_writers_at_once_leave_the_files_of_one(tmp_path: Path) -> None:
     for writer in writers:
         writer.communicate()
         assert writer.returncode == 0
-    assert len(seen) == ROUNDS
+    assert len(seen) == rounds
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(NAMES)
 
 
