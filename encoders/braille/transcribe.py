@@ -25,7 +25,8 @@ __all__ = ["PARAGRAPH_END", "Transcriber"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
-PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|\s*[\f\u2029]\s*")
+# Blanks are looked at from where they begin, or a long run of them would be gone through from each.
+PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|(?<!\s)\s*[\f\u2029]\s*|[\f\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
 _ARROWS = "\u2190"

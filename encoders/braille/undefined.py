@@ -48,7 +48,7 @@ _JOINERS = "\u200c\u200d"
 _TERMINAL = re.compile("\x1b(?:\\[[0-?]*[ -/]*[@-~]|\\][^\x07\x1b]*(?:\x07|\x1b\\\\)|[@-Z\\\\-_])")
 # Vowel signs of Arabic and Hebrew, and what is typed before them.
 _VOWELS, _BEFORE_VOWELS = "\u064b-\u0650\u0652\u0670\u05b0-\u05bb\u05c7", "\u0651\u05bc\u05bf\u05c1\u05c2"
-_TURNED = re.compile(f"[{_VOWELS}]+[{_BEFORE_VOWELS}]")
+_TURNED = re.compile(f"[{_VOWELS}][{_BEFORE_VOWELS}]")
 _TONE_NAMES = dict(
     zip(
         "\U0001f3fb\U0001f3fc\U0001f3fd\U0001f3fe\U0001f3ff",

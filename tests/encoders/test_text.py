@@ -268,6 +268,14 @@ def test_ten_thousand_emoji():
     assert [(use.count, use.action) for use in report.undefined] == [(10_000, "named")]
 
 
+@pytest.mark.parametrize("run", [" ", "\t", "\n", "\f", "\u2029 ", "\r\n"])
+def test_a_megabyte_of_white_space_is_passed_over(run):
+    """From each blank to the next word it would take an hour."""
+    scene = encode_text(f"one{run * (1_000_000 // len(run))}two", GRID, TextOptions(table="en-ueb-g1.ctb"))
+    assert " ".join(frame.text for frame in scene.frames).split() == ["one", "two"]
+    assert scene.text_frames.check().text_equal
+
+
 def test_a_long_line_without_a_space_is_complete():
     text = "abcdefghij" * 20_000
     scene = encode_text(text, GRID, TextOptions(table="en-ueb-g1.ctb"))
