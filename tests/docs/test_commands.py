@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.docs_pages import DOCS, EVERY, README, ROOT, blocks, generator, prose, read
+from tests.support.everyday import one_in
 
 MADE = generator("commands")
 COMMANDS = MADE.commands()
@@ -114,7 +115,7 @@ def runnable() -> list[Path]:
     return [README, *(DOCS / f"{name}.md" for name in ("tutorial", "apps", "devices", "playing"))]
 
 
-@pytest.mark.parametrize("page", runnable(), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", one_in(2, runnable()), ids=lambda page: page.name)
 def test_the_cheap_ones_run_one_after_another(page: Path, workshop: Path) -> None:
     ran = 0
     for line in dict.fromkeys(shown([page])):

@@ -49,8 +49,8 @@ def test_hjif_carries_the_whole_grid_with_its_phases(tmp_path):
 @pytest.mark.parametrize("actuator", [None, (2, 3)])
 def test_phone_formats_carry_one_curve(tmp_path, suffix, actuator):
     path = tmp_path / f"x{suffix}"
-    write_exchange(plan(frames=60), path, actuator=actuator)
-    made, back = haptic_curves(plan(frames=60)), read_exchange(path)
+    write_exchange(plan(frames=12), path, actuator=actuator)
+    made, back = haptic_curves(plan(frames=12)), read_exchange(path)
     wanted = made.level.mean(axis=(1, 2)) if actuator is None else made.level[:, 2, 3]
     np.testing.assert_allclose(at(back, made.time_s), wanted, atol=1e-5)
     assert back.frequency_hz[0] == pytest.approx(made.frequency_hz[0], abs=0.01)

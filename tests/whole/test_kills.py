@@ -219,7 +219,7 @@ class Harness:
 @pytest.mark.parametrize("name", CASES)
 def test_killed_a_few_times(tmp_path: Path, name: str) -> None:
     harness = Harness(CASES[name], tmp_path, seed=1)
-    harness.kill(3)
+    harness.kill(2)
 
 
 @pytest.mark.slow
