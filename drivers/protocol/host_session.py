@@ -50,6 +50,7 @@ class Timing:
     hello_s : and greets again after this.
     window : packets under way, at most 32.
     burst_bytes : sent at a time.
+    lead_s : seconds of samples that are sent ahead of those that play; before it plays, as many as start it.
     """
 
     heartbeat_s: float = 0.025
@@ -57,6 +58,7 @@ class Timing:
     hello_s: float = 0.25
     window: int = 32
     burst_bytes: int = 1 << 14
+    lead_s: float = math.inf
 
 
 @dataclass
@@ -226,7 +228,7 @@ class HostSession:
             return False
         samples = 0
         if isinstance(message, SamplesMessage):
-            if ack is None or message.first + len(message.codes) > ack.accept_samples:
+            if ack is None or message.first + len(message.codes) > self._room(ack):
                 return False
             samples = len(message.codes)
         elif not isinstance(message, StartMessage | End):
@@ -237,6 +239,17 @@ class HostSession:
         self._next += 1
         self._waiting = None
         return True
+
+    def _room(self, ack: Ack) -> int:
+        """Before which sample may be sent."""
+        found, lead_s = self.capabilities, self._timing.lead_s
+        if found is None or math.isinf(lead_s):
+            return ack.accept_samples
+        ahead = max(1, round(lead_s * found.rate_hz))
+        if ack.state is not State.PLAYING:
+            # Half of the buffer starts it; samples go out in packets.
+            ahead = max(ahead, (found.buffer_samples * 5) // 8)
+        return min(ack.accept_samples, ack.played + ahead)
 
     def _greeted(self, found: Capabilities, now: float) -> None:
         if self._phase is not _Phase.GREETING:

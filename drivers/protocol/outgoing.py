@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..channels import Role
+from chainsim import Device
+
+from ..channels import Channel, Role
 from ..errors import DriverError
 from ..formats.samples import SampleReader
+from ..waveform.coupling import CouplingEvent
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
 from .measured import Measure, turns_of
-from .messages import FULL_CODE, VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
+from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
 from .replies import Capabilities
 
-__all__ = ["End", "Message", "UnfitController", "check_fit", "session_messages"]
+__all__ = [
+    "Coder", "End", "Message", "UnfitController", "check_fit", "fitting", "link_message", "measures",
+    "session_messages",
+]  # fmt: skip
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
@@ -106,62 +113,91 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
-    waiting = merge(
-        _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
+    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, fitting(scene_note(manifest), found, 17))
+    # Events go by time; in the manifest they do so within each row only.
+    links = (
+        link_message(event, manifest.rate_hz, found) for event in sorted(manifest.coupling, key=lambda event: event.t_s)
     )
+    waiting = merge(links, _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at)
     event = next(waiting, None)
-    most = SamplesMessage.most(found.channels, found.max_payload)
-    block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * manifest.rate_hz)))
-    drives = [channel.index for channel in manifest.channels if channel.role is Role.DRIVE]
-    shaper, first = Shaper(len(drives)), 0
-    for volts in reader.blocks(block):
+    coder, first = Coder(manifest.channels, manifest.rate_hz, found), 0
+    for volts in reader.blocks(coder.block):
         while event is not None and event.at < first + len(volts):
             yield event
             event = next(waiting, None)
-        codes = volts * (FULL_CODE / found.full_volts)
-        codes[:, drives] = shaper.round(codes[:, drives].T).T
-        codes = np.rint(codes).clip(-FULL_CODE, FULL_CODE)
-        yield SamplesMessage(first, codes.astype(np.int16))
+        yield SamplesMessage(first, coder.codes(volts))
         first += len(volts)
     yield End(first)
 
 
-def _links(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
-    # Events go by time; in the manifest they do so within each row only.
-    for event in sorted(manifest.coupling, key=lambda event: event.t_s):
-        at = round(event.t_s * manifest.rate_hz)
-        ramp = max(0, round((event.t_s + event.ramp_s) * manifest.rate_hz) - at)
-        step = found.lam_step or 1.0
-        codes = tuple(min(65535, round(lam / step)) for lam in event.lam)
-        yield LinkCoupling(at, event.row, ramp, codes)
+class Coder:
+    """Volts as the codes of a controller: constant ones the nearest, of drives with the error pushed up in frequency.
+
+    Attributes
+    ----------
+    block : how many samples go into a packet.
+    """
+
+    def __init__(self, channels: Sequence[Channel], rate_hz: int, found: Capabilities) -> None:
+        most = SamplesMessage.most(found.channels, found.max_payload)
+        self.block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * rate_hz)))
+        self._drives = [channel.index for channel in channels if channel.role is Role.DRIVE]
+        self._shaper = Shaper(len(self._drives))
+        self._scale = FULL_CODE / found.full_volts
+
+    def codes(self, volts: NDArray[np.float64]) -> Codes:
+        """The next samples, shape (S, channels), as int16 of that shape."""
+        codes = volts * self._scale
+        codes[:, self._drives] = self._shaper.round(codes[:, self._drives].T).T
+        return np.rint(codes).clip(-FULL_CODE, FULL_CODE).astype(np.int16)
+
+
+def link_message(event: CouplingEvent, rate_hz: int, found: Capabilities) -> LinkCoupling:
+    """Links that begin to move, in samples and the controller's steps."""
+    at = round(event.t_s * rate_hz)
+    ramp = max(0, round((event.t_s + event.ramp_s) * rate_hz) - at)
+    step = found.lam_step or 1.0
+    return LinkCoupling(at, event.row, ramp, tuple(min(65535, round(lam / step)) for lam in event.lam))
 
 
 def _marks(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     for number, mark in enumerate(manifest.frames):
-        yield Mark(round(mark.start_s * manifest.rate_hz), number, _fitting(frame_note(mark), found, 12))
+        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, 12))
 
 
 def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
-    """A window for each frame, where the controller measures: the second half of the time its pattern stands.
-
-    What is left there of the way in, where actuators are not as planned, has had the first half to fade.
-    """
-    if not found.measures:
-        return
-    device, rate = manifest.device, manifest.rate_hz
     for number, mark in enumerate(manifest.frames):
-        at, stop = round((mark.settled_s + mark.end_s) / 2 * rate), round(mark.end_s * rate)
-        # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
-        others = float(mark.omega.max()) if device.bias == "none" else 0.0
-        asked = [omega if moving else others for omega, moving in zip(mark.omega.tolist(), mark.moving, strict=True)]
-        turns = [turns_of(omega, device.tau_per_s / rate) if omega else 0 for omega in asked]
-        while len(turns) > 1 and turns[-1] == turns[-2]:
-            turns.pop()
-        if stop > at and len(turns) <= Measure.most(found.max_payload):
-            yield Measure(at, stop - at, number, tuple(turns))
+        window = round((mark.settled_s + mark.end_s) / 2 * manifest.rate_hz), round(mark.end_s * manifest.rate_hz)
+        yield from measures(manifest.device, number, window, mark.omega.tolist(), mark.moving, found)
 
 
-def _fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:
+def measures(
+    device: Device,
+    frame: int,
+    window: tuple[int, int],
+    omega: Sequence[float],
+    moving: Sequence[bool],
+    found: Capabilities,
+) -> Iterator[Measure]:
+    """What is asked of a controller that measures while a frame goes out: nothing where it does not fit into a packet.
+
+    Parameters
+    ----------
+    window : first sample, and that after the last. Take the second half of the time its pattern stands: what is left of
+        the way in, where actuators are not as planned, has had the first half to fade.
+    omega, moving : of each row.
+    """
+    at, stop = window
+    # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
+    others = max(omega) if device.bias == "none" else 0.0
+    asked = [one if moves else others for one, moves in zip(omega, moving, strict=True)]
+    turns = [turns_of(one, device.tau_per_s / device.amplifier.rate_hz) if one else 0 for one in asked]
+    while len(turns) > 1 and turns[-1] == turns[-2]:
+        turns.pop()
+    if found.measures and stop > at and len(turns) <= Measure.most(found.max_payload):
+        yield Measure(at, stop - at, frame, tuple(turns))
+
+
+def fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:
     """The note, or nothing when it is too long for a packet: it is for recorders only."""
     return note if fixed + len(note) <= found.max_payload else b""

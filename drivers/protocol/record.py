@@ -13,23 +13,31 @@ from typing import Any
 import numpy as np
 
 from chainsim import Device
+from planner import FramePlan
 
 from ..channels import channels_of
 from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
-from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
+from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open, mark_of
 from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
-__all__ = ["ArrivalRecorder", "CutShort", "frame_note", "scene_note"]
+__all__ = ["ArrivalRecorder", "CutShort", "frame_note", "plan_note", "scene_note"]
 
 MOST_NOTE_BYTES = 1 << 20
+# What a manifest has of a frame, and a note has no room for.
+NOT_NOTED = ("tones", "phase", "spread")
 
 
 def scene_note(manifest: Manifest) -> bytes:
     """What START tells a recorder: how to read the frames as text."""
     return _packed({"device": manifest.device.name, "encoding": dict(manifest.encoding)})
+
+
+def plan_note(device: Device, frame: FramePlan, number: int) -> bytes:
+    """The same as `frame_note` of a frame that is not in a manifest yet."""
+    return _packed({key: value for key, value in mark_of(device, frame, number).items() if key not in NOT_NOTED})
 
 
 def frame_note(mark: FrameMark) -> bytes:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from planner import Measured
+from planner import FramePlan, Measured
 
 from ..formats.samples import SampleReader
 from ..protocol.host_session import HostSession, StreamReport, Timing
-from ..protocol.outgoing import session_messages
+from ..protocol.outgoing import Message, session_messages
+from ..protocol.plan_messages import plan_messages
 from ..protocol.playout import BUFFER_S
+from ..protocol.replies import Capabilities
+from ..safety import GateLimits
 from ..waveform.manifest import Manifest
 from .base import SinkError, SinkReport
 from .serial_play import run_session
 from .uart import Uart
 
-__all__ = ["Controller", "buffer_notes"]
+__all__ = ["LEAD_S", "Controller", "buffer_notes"]
+
+LEAD_S = 0.5
+"""Seconds that frames which are still corrected go out ahead: enough for a host with little else to do."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +37,17 @@ class Controller:
     baud : bits per second, None: the controller's own.
     patience_s : how long to wait for a controller that is not heard.
     on_measured : gets what the controller measured of each frame, where it does.
+    frames : what is played in place of the samples, each frame drawn shortly before it goes out: a plan as long as they
+        are, for the same device, that is corrected meanwhile. Every sample of it is held against `limits`.
+    limits : None: those of the device.
     """
 
     port: str
     baud: int | None = None
     patience_s: float = 10.0
     on_measured: Callable[[Measured], None] | None = None
+    frames: Iterable[FramePlan] | None = None
+    limits: GateLimits | None = None
 
     def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
         """Nothing more than the gate asks: what the controller can do is known once it answers."""
@@ -54,8 +65,8 @@ class Controller:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
         session = HostSession(
-            lambda found: session_messages(manifest, samples, found, session=number),
-            session=number, timing=Timing(), on_measured=self.on_measured,
+            lambda found: self._messages(manifest, samples, found, number), session=number,
+            timing=Timing() if self.frames is None else Timing(lead_s=LEAD_S), on_measured=self.on_measured,
         )  # fmt: skip
         run_session(session, self._line, patience_s=self.patience_s, progress=progress)
         stream = session.report
@@ -66,6 +77,14 @@ class Controller:
             lines=_lines(stream),
             notes=(f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream)),
         )
+
+    def _messages(
+        self, manifest: Manifest, samples: SampleReader, found: Capabilities, session: int
+    ) -> Iterator[Message]:
+        if self.frames is None:
+            return session_messages(manifest, samples, found, session=session)
+        limits = self.limits or GateLimits.of(manifest.device, len(manifest.channels))
+        return plan_messages(manifest, self.frames, found, session=session, limits=limits)
 
     def close(self) -> None:
         """Nothing stays open after `play`."""
