@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -287,6 +286,25 @@ RUNS: dict[str, Callable[[int, Callable[[str], None]], dict[str, Any]]] = {
 }
 
 
+WAYS = {"planned": "as planned", "adapted": "`--adapt`", "led_in": "`--adapt`, after three pages of 2 s"}
+
+
+def table(kept: dict[str, Any]) -> str:
+    """What was measured, as the table of docs/playing.md."""
+    lines = ["| grid | plants | way | " + " | ".join(f"page {page}" for page in PAGES) + " | peak |"]
+    lines.append("|---" * (len(PAGES) + 4) + "|")
+    for name, found in kept.items():
+        for way, words in WAYS.items():
+            if way not in found:
+                continue
+            one = found[way]
+            cells = [f"{ok:.0%}, {error:.1%}" for ok, error in zip(one["ok"], one["error"], strict=True)]
+            cells += ["-"] * (len(PAGES) - len(cells))
+            row = (name, str(found["plants"]), words, *cells, f"{one['peak_volts']:.0f} V")
+            lines.append(f"| {' | '.join(row)} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
@@ -296,8 +314,8 @@ def main() -> None:
     kept = json.loads(given.out.read_text(encoding="utf-8")) if given.out.exists() else {}
     for name in given.only.split(","):
         kept[name] = RUNS[name](given.plants, lambda said, name=name: print(name, said, flush=True))
-        kept["load"] = os.getloadavg()[0]
         given.out.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    print(table(kept))
 
 
 if __name__ == "__main__":
