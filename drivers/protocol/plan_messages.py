@@ -12,7 +12,8 @@ from planner import FramePlan
 from ..channels import channels_of
 from ..safety import Gate, GateLimits
 from ..waveform.coupling import CouplingWriter
-from ..waveform.manifest import Manifest, mark_of
+from ..waveform.manifest import Manifest
+from ..waveform.marking import mark_of
 from ..waveform.sampling import Waveform
 from .messages import Mark, SamplesMessage, StartMessage
 from .outgoing import Coder, End, Message, check_fit, fitting, link_message, measures

@@ -19,7 +19,8 @@ from ..channels import channels_of
 from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
-from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open, mark_of
+from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
+from ..waveform.marking import mark_of
 from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
