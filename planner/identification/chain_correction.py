@@ -87,7 +87,7 @@ def factors_for(device: Device, planned: Floats, known: Floats, state: Operating
         found = Factors(drive / drive_0, links / links_0)
     else:
         real = _Real(known).moves(state)
-        share = 1.0 if real is None else abs(np.vdot(real, state.phasor)) / float(np.vdot(real, real).real)
+        share = 1.0 if real is None else float(abs(np.vdot(real, state.phasor)) / np.vdot(real, real).real)
         found = Factors(share, np.ones(device.chain_length - 1))
     return _within(device, state, found, old)
 
