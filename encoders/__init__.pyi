@@ -51,10 +51,14 @@ from .braille.tables import (
     resolve_tables as resolve_tables,
 )
 from .braille.text import (
-    TextFrames as TextFrames,
-    TextOptions as TextOptions,
     TextScene as TextScene,
     encode_text as encode_text,
+)
+from .braille.text_frames import (
+    TextFrames as TextFrames,
+)
+from .braille.text_options import (
+    TextOptions as TextOptions,
 )
 from .braille.translation import (
     Translation as Translation,
@@ -64,7 +68,9 @@ from .choices import (
     EmphasisChoice as EmphasisChoice,
     Grade as Grade,
     ImageChoice as ImageChoice,
+    LineEnds as LineEnds,
     Mathematics as Mathematics,
+    PageNumbering as PageNumbering,
     Presentation as Presentation,
     Undefined as Undefined,
 )
@@ -126,6 +132,7 @@ from .scene import (
     GoesOn as GoesOn,
     GridShape as GridShape,
     Heading as Heading,
+    PageNumber as PageNumber,
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["EmphasisChoice", "Grade", "ImageChoice", "Mathematics", "Presentation", "Undefined"]
+__all__ = [
+    "EmphasisChoice", "Grade", "ImageChoice", "LineEnds", "Mathematics", "PageNumbering", "Presentation", "Undefined",
+]  # fmt: skip
 
 
 class Undefined(StrEnum):
@@ -53,3 +55,22 @@ class Mathematics(StrEnum):
 
     NEMETH = "nemeth"
     WORDS = "words"
+
+
+class LineEnds(StrEnum):
+    """What becomes of single line ends of a text: a new line begins there too, or the words run on."""
+
+    KEEP = "keep"
+    JOIN = "join"
+
+
+class PageNumbering(StrEnum):
+    """Where the number of a page is felt.
+
+    ``none``: nowhere. ``corner``: in the last cells of the page; on lines of fewer than 12 cells in the last cell
+    alone, by its last digit. ``frame``: in a frame of its own before the page, with the number of pages.
+    """
+
+    NONE = "none"
+    CORNER = "corner"
+    FRAME = "frame"

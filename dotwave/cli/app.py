@@ -21,7 +21,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import EmphasisChoice, Grade, ImageChoice, Mathematics, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation, Undefined
 
 from ..errors import AppError, Terminated
 from .command import (
@@ -105,6 +105,10 @@ def text(
     math: Annotated[Mathematics | None, typer.Option(help="Formulas of documents, in Nemeth code or words.")] = None,
     start_at: Start = None,
     pages: Annotated[str | None, typer.Option(help="Only these, such as 10-20; counted from --from.")] = None,
+    lines: Annotated[LineEnds | None, typer.Option(help="Single line ends: a new line too, or a blank.")] = None,
+    page_numbers: Annotated[
+        PageNumbering | None, typer.Option(help="Of no page, in its last cells, or in a frame of its own.")
+    ] = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -138,6 +142,7 @@ def text(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
         rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
         encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
+        lines=lines, page_numbers=page_numbers,
     )  # fmt: skip
     profile = device_of(device)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)

@@ -43,6 +43,7 @@ def frame_note(mark: FrameMark) -> bytes:
             "span": list(mark.span),
             **({} if mark.wish.contrast_db is None else {"contrast_db": mark.wish.contrast_db}),
             **({"goes_on": [asdict(one) for one in mark.goes_on]} if mark.goes_on else {}),
+            **({} if mark.number is None else {"number": asdict(mark.number)}),
         }
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
-from encoders import GoesOn
+from encoders import GoesOn, PageNumber
 from planner import FramePlan, FrameWish, OperatingPoint
 
 from ..channels import Channel, channels_of
@@ -60,6 +60,7 @@ class FrameMark:
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
     goes_on : where words of the page go on, and which cells are not of the word there.
+    number : which cells show the number of the page; None where none do.
     """
 
     start_s: float
@@ -77,6 +78,7 @@ class FrameMark:
     moving: tuple[bool, ...]
     wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
+    number: PageNumber | None = None
 
 
 @dataclass(frozen=True)
@@ -312,6 +314,8 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         mark["contrast_db"] = frame.wish.contrast_db
     if frame.frame.goes_on:
         mark["goes_on"] = [asdict(one) for one in frame.frame.goes_on]
+    if frame.frame.number is not None:
+        mark["number"] = asdict(frame.frame.number)
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):

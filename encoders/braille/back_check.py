@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 
 from ..choices import Undefined
 from ..errors import TableMissing
-from ..scene import GoesOn
+from ..scene import GoesOn, PageNumber
 from . import louis_binding
 from .alphabet import alphabet
 from .dots import BLANK, LOWER_SIX
 from .joining import Emphases, join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
-from .transcribe import Transcriber
+from .transcribe import Transcriber, paragraphs
 from .translation import translate
 from .undefined import writable
 
@@ -32,6 +32,8 @@ __all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate"
 PIECE = 2000
 """Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
 LONGEST_WORD = 100_000
+LONGEST_REST = 200
+"""Characters looked at of a word that goes on."""
 REACH = 12
 """Words looked ahead to find where two texts agree again."""
 
@@ -56,12 +58,13 @@ class Difference:
 
 
 class FeltPage(NamedTuple):
-    """Cells of a page as `read_cells` gives them, the source text they show, where words go on, its emphases."""
+    """Cells of a page as `read_cells` gives them, the text they show, where words go on, its emphases, its number."""
 
     cells: str
     text: str = ""
     goes_on: tuple[GoesOn, ...] = ()
     emphases: Emphases = ()
+    number: PageNumber | None = None
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,8 @@ def back_check(
     given = list(pages)
     noted = "continuation" in encoding and not any(isinstance(page, str) for page in given)
     felt = [FeltPage(page) if isinstance(page, str) else page for page in given]
-    joined = join_pages((page.cells for page in felt), encoding, (page.goes_on for page in felt) if noted else None)
+    goes_on = [page.goes_on for page in felt] if noted else None
+    joined = join_pages((page.cells for page in felt), encoding, goes_on, (page.number for page in felt))
     reading = _Reading(encoding)
     source = TextSource(text, SourceKind(encoding["kind"]), "text", emphases=tuple(emphases))
     expected = reading.written(source)
@@ -195,8 +199,8 @@ class _Reading:
     def written(self, source: TextSource, log: ReportLog | None = None) -> str:
         """Cells of a source, words parted by one blank."""
         log = log or ReportLog()
-        paragraphs = self.transcriber.paragraphs(source)
-        return _joined_cells(word for a, b in paragraphs for word in self.transcriber.words(source, a, b, log))
+        spans = paragraphs(source.text)
+        return _joined_cells(word for a, b in spans for word in self.transcriber.words(source, a, b, log))
 
     def alone(self, pages: Iterable[FeltPage], encoding: Mapping[str, Any]) -> Iterator[Difference]:
         """Pages that do not say what they show when nothing else is read.
@@ -204,14 +208,34 @@ class _Reading:
         Of words that are whole on their page only digits and capitals are looked at, what indicators of a page before
         could change: the letters of such words are those of the text already if all pages together are.
         """
-        begun = False
-        for number, page in enumerate(pages):
-            text, goes_on = page.text.strip(), bool(page.goes_on)
-            cells = unmarked(page.cells, encoding, page.goes_on)
+        given, begun = list(pages), False
+        for number, page in enumerate(given):
+            text = page.text.rstrip()
+            if page.number is not None and not text:
+                continue
+            goes_on = bool(page.goes_on)
+            cells = unmarked(page.cells, encoding, page.goes_on, page.number)
             back = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else text
             begun = goes_on
-            if back != text:
-                yield Difference(text, back, number)
+            if back != text and not (goes_on and self._begins(cells, text, given[number + 1 :])):
+                yield Difference(text.lstrip(), back, number)
+
+    def _begins(self, cells: str, text: str, following: list[FeltPage]) -> bool:
+        """Whether the table writes just these cells for the text where the rest of its last word follows.
+
+        An indicator of an address governs it as a whole; which cells it stands before is told by the rest of the word.
+        """
+        rest = ""
+        for page in following:
+            rest += page.text
+            if len(rest) > LONGEST_REST or rest != rest.rstrip() or " " in rest:
+                break
+        rest = (rest.split() or [""])[0]
+        if not rest or alphabet(self.tables).lacks(text + rest):
+            return False
+        start = text.lstrip()
+        found = translate(self.tables, start + rest)
+        return found.cells.startswith(cells) and found.cell_of_text[len(start)] == len(cells)
 
     def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> str:
         """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""

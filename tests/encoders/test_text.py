@@ -307,7 +307,7 @@ def test_pieces_of_a_long_line_do_not_part_letters_from_their_marks():
 
 def test_memory_does_not_grow_with_the_text(monkeypatch):
     # The frames of a short text are kept; those of this one are taken for a long one's.
-    monkeypatch.setattr("encoders.braille.text.MOST_KEPT", 0)
+    monkeypatch.setattr("encoders.braille.text_frames.MOST_KEPT", 0)
     paragraph = "The river ran under the old stone bridge, and people knew it.\n\n"
 
     def peak(times: int) -> int:

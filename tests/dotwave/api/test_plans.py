@@ -17,8 +17,8 @@ import dotwave as dw
 from chainsim import Outcome
 from dotwave.api import plans
 from drivers import read_waveform
-from encoders.braille import text as encoder
-from encoders.braille.layout import paginate
+from encoders.braille import text_frames as encoder
+from encoders.braille.filling import paginate
 from planner import Plan, plan_scene
 
 ROOT = Path(__file__).resolve().parents[3]
