@@ -51,14 +51,9 @@ from .braille.tables import (
     resolve_tables as resolve_tables,
 )
 from .braille.text import (
+    TextFrames as TextFrames,
     TextScene as TextScene,
     encode_text as encode_text,
-)
-from .braille.text_frames import (
-    TextFrames as TextFrames,
-)
-from .braille.text_options import (
-    TextOptions as TextOptions,
 )
 from .braille.translation import (
     Translation as Translation,
@@ -72,6 +67,7 @@ from .choices import (
     Mathematics as Mathematics,
     PageNumbering as PageNumbering,
     Presentation as Presentation,
+    TextOptions as TextOptions,
     Undefined as Undefined,
 )
 from .documents.flat import (

@@ -59,8 +59,7 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
-    goes_on : where words of the page go on, and which cells are not of the word there.
-    number : which cells show the number of the page; None where none do.
+    goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     """
 
     start_s: float
@@ -310,12 +309,9 @@ def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         "page": frame.frame.page,
         "span": list(frame.frame.span),
     }
-    if frame.wish.contrast_db is not None:
-        mark["contrast_db"] = frame.wish.contrast_db
-    if frame.frame.goes_on:
-        mark["goes_on"] = [asdict(one) for one in frame.frame.goes_on]
-    if frame.frame.number is not None:
-        mark["number"] = asdict(frame.frame.number)
+    goes_on, page_number = [asdict(one) for one in frame.frame.goes_on], frame.frame.number
+    rare = {"contrast_db": frame.wish.contrast_db, "goes_on": goes_on, "number": page_number and asdict(page_number)}
+    mark |= {key: value for key, value in rare.items() if value}
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):

@@ -269,7 +269,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         moving=_moving(frame, device),
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
-        number=frame.number and PageNumber(frame.number.at, frame.number.cells),
+        number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
     )
 
 

@@ -148,7 +148,7 @@ def test_times_are_checked(bad):
 def test_gaps_and_larger_grids_show_fewer_and_more_cells():
     assert all(len(frame.cells) == 2 for frame in frames_of("Hello world", cell_gap=2, line_gap=1))
     (frame,) = frames_of("Hello world", shape=GridShape(40, 96))
-    assert frame.cells.startswith("⠠⠓⠑⠇⠇⠕⠀⠸⠺⠀")
+    assert frame.cells.startswith("⠀⠀⠠⠓⠑⠇⠇⠕⠀⠸⠺⠀")
 
 
 def test_arrays_are_complex_and_read_only():
@@ -307,7 +307,7 @@ def test_pieces_of_a_long_line_do_not_part_letters_from_their_marks():
 
 def test_memory_does_not_grow_with_the_text(monkeypatch):
     # The frames of a short text are kept; those of this one are taken for a long one's.
-    monkeypatch.setattr("encoders.braille.text_frames.MOST_KEPT", 0)
+    monkeypatch.setattr("encoders.braille.text.MOST_KEPT", 0)
     paragraph = "The river ran under the old stone bridge, and people knew it.\n\n"
 
     def peak(times: int) -> int:

@@ -17,7 +17,7 @@ import dotwave as dw
 from chainsim import Outcome
 from dotwave.api import plans
 from drivers import read_waveform
-from encoders.braille import text_frames as encoder
+from encoders.braille import text as encoder
 from encoders.braille.filling import paginate
 from planner import Plan, plan_scene
 
