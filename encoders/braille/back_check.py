@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import islice
 from typing import Any, NamedTuple
 
 from ..choices import Undefined
@@ -23,7 +24,7 @@ from .dots import BLANK, LOWER_SIX
 from .joining import Emphases, join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
-from .transcribe import Transcriber, paragraphs
+from .transcribe import PARAGRAPH_END, Transcriber, paragraphs
 from .translation import translate
 from .undefined import writable
 
@@ -33,7 +34,8 @@ PIECE = 2000
 """Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
 LONGEST_WORD = 100_000
 LONGEST_REST = 200
-"""Characters looked at of a word that goes on."""
+MOST_FOLLOWING = 64
+"""Characters, and pages, looked at of what follows a page."""
 REACH = 12
 """Words looked ahead to find where two texts agree again."""
 
@@ -213,44 +215,67 @@ class _Reading:
             text = page.text.rstrip()
             if page.number is not None and not text:
                 continue
-            goes_on = bool(page.goes_on)
+            last = len(page.cells.replace("\n", "")) // int(encoding["run"]) - 1
+            goes_on = any(one.run == last for one in page.goes_on)
             cells = unmarked(page.cells, encoding, page.goes_on, page.number)
-            back = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else text
+            found = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else None
             begun = goes_on
-            if back != text and not (goes_on and self._begins(cells, text, given[number + 1 :])):
-                yield Difference(text.lstrip(), back, number)
+            if found and not self._begins(cells, page, goes_on, given[number + 1 :]):
+                yield Difference(*found, number)
 
-    def _begins(self, cells: str, text: str, following: list[FeltPage]) -> bool:
-        """Whether the table writes just these cells for the text where the rest of its last word follows.
+    def _begins(self, cells: str, page: FeltPage, goes_on: bool, following: list[FeltPage]) -> bool:
+        """Whether the table writes just these cells for the text of a page where that of the next ones follows.
 
-        An indicator of an address governs it as a whole; which cells it stands before is told by the rest of the word.
+        An indicator of an address governs it as a whole, and what ends a text may be written otherwise than the same
+        in its middle. Nothing is taken from the pages before: what governs the cells stands on their page.
         """
-        rest = ""
-        for page in following:
-            rest += page.text
-            if len(rest) > LONGEST_REST or rest != rest.rstrip() or " " in rest:
-                break
-        rest = (rest.split() or [""])[0]
-        if not rest or alphabet(self.tables).lacks(text + rest):
+        text = page.text.rstrip()
+        after = "".join(one.text for one in islice(following, MOST_FOLLOWING))[:LONGEST_REST]
+        rest = (after.split() or [""])[0]
+        if not rest or PARAGRAPH_END.search(page.text, len(text)):
             return False
-        start = text.lstrip()
-        found = translate(self.tables, start + rest)
-        return found.cells.startswith(cells) and found.cell_of_text[len(start)] == len(cells)
+        for between in ("",) if goes_on else ("", " "):
+            whole = self.written(TextSource(text + between + rest, SourceKind.TEXT, "page", emphases=page.emphases))
+            if whole.startswith(cells) and (goes_on or whole[len(cells) :].startswith(BLANK)):
+                start = text[list(paragraphs(text))[-1][0] :].lstrip()
+                found = translate(self.tables, start + between + rest)
+                left = len(found.cells) - found.cell_of_text[len(start)]
+                if whole[len(cells) :].startswith(BLANK) or left == len(whole) - len(cells):
+                    return True
+        return False
 
-    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> str:
-        """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""
+    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> tuple[str, str] | None:
+        """What of `text` the cells do not say, and what they say; `begun` and `goes_on` say which words are parts."""
         log = ReportLog()
-        written = self.written(TextSource(text, SourceKind.TEXT, "page", emphases=emphases), log)
+        source = TextSource(text, SourceKind.TEXT, "page", emphases=emphases)
+        words = [word for a, b in paragraphs(text) for word in self.transcriber.words(source, a, b, log)]
+        own = _joined_cells(words)
         # The name of a character may be spread over pages that all show the one character.
-        if cells == written or log.undefined_total:
-            return text
-        words = cells.split(BLANK)
-        parts = (not begun or written.startswith(words[0])) and (not goes_on or written.endswith(words[-1]))
-        if parts and not _indicated(text):
-            return text
-        back, likely = back_translate(self.tables, cells), back_translate(self.tables, written)
-        look: Callable[[str], str] = _indicated if parts else _letters
-        return text if look(back) in (look(text), look(likely)) else back
+        if cells == own or log.undefined_total:
+            return None
+        felt, written = cells.split(BLANK), own.split(BLANK)
+        first = _alike(felt, written)
+        last = min(_alike(felt[::-1], written[::-1]), len(felt) - first, len(written) - first)
+        if len(words) != len(written):  # words of several pieces
+            first = last = 0
+        differing = words[first : len(words) - last]
+        said = text[differing[0].start : differing[-1].end].strip() if differing else ""
+        cut = (begun and not first and not own.startswith(felt[0])) or (
+            goes_on and not last and not own.endswith(felt[-1])
+        )
+        if not cut and not _indicated(said):
+            return None
+        back, likely = (
+            back_translate(self.tables, BLANK.join(part[first : len(part) - last])) for part in (felt, written)
+        )
+        look: Callable[[str], str] = _letters if cut else _indicated
+        return None if look(back) in (look(said), look(likely)) else (said, back)
+
+
+def _alike(one: list[str], other: list[str]) -> int:
+    """How many of the first words are the same."""
+    shorter = min(len(one), len(other))
+    return next((at for at in range(shorter) if one[at] != other[at]), shorter)
 
 
 def _letters(text: str) -> str:

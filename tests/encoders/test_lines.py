@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from encoders import GridShape, LayoutError, TextOptions, TextSource, cells_to_brf, encode_text
+from encoders import GridShape, LayoutError, LineEnds, TextOptions, TextSource, cells_to_brf, encode_text
 
 WIDE = GridShape(40, 96)
 TIGER = (
@@ -114,11 +114,11 @@ def test_line_ends_are_kept_or_joined_by_choice():
     assert lines_of(TIGER, lines="join")[0][1] == "OF THE NIGHT2 ,WHAT IMMORTAL HAND OR EYE1 ,COULD"
     # Numbers one below the other are not one number.
     assert lines_of("100\n200", lines="keep")[0][:2] == ["#AJJ", "#BJJ"]
-    small = [frame.text for frame in encode_text("ab\ncd", GridShape(6, 6), TextOptions(lines="keep")).frames]
+    small = [frame.text for frame in encode_text("ab\ncd", GridShape(6, 6), TextOptions(lines=LineEnds.KEEP)).frames]
     assert small == ["ab\u2028", "cd"]
     assert [frame.text for frame in encode_text("a\nb", GridShape(6, 6), TextOptions()).frames] == ["a\nb"]
     with pytest.raises(LayoutError, match="lines: expected one of keep, join, got 'cut'"):
-        TextOptions(lines="cut")
+        TextOptions(lines="cut")  # type: ignore[arg-type]
 
 
 def test_braille_keeps_its_lines_and_pages_where_they_fit():

@@ -13,6 +13,7 @@ from encoders import (
     GridShape,
     LayoutError,
     PageNumber,
+    PageNumbering,
     TextOptions,
     back_check,
     cells_to_brf,
@@ -52,7 +53,7 @@ def test_on_a_small_page_its_last_cell_is_the_last_digit():
     frames = frames_of(PROSE[:200], SMALL, page_numbers="corner")
     assert len(frames) > 11
     assert "".join(brf(frame)[-1][-1] for frame in frames[:11]) == "ABCDEFGHIJA"
-    assert [frame.number.at for frame in frames] == [5] * len(frames)
+    assert {frame.number and frame.number.at for frame in frames} == {5}
 
 
 def test_a_frame_of_its_own_says_the_page_and_how_many_there_are():
@@ -73,7 +74,7 @@ def many_pages(frames: list[Frame]) -> int:
 
 
 def test_without_what_frames_say_the_number_is_text():
-    scene = encode_text("Hello world", SMALL, TextOptions(page_numbers="corner"))
+    scene = encode_text("Hello world", SMALL, TextOptions(page_numbers=PageNumbering.CORNER))
     frames = list(scene.frames)
     cells, notes = [frame.cells for frame in frames], [frame.goes_on for frame in frames]
     assert join_pages(cells, scene.encoding, notes, [frame.number for frame in frames]) == "⠠⠓⠑⠇⠇⠕⠀⠸⠺"
@@ -93,9 +94,9 @@ def test_pages_that_are_chosen_are_those_that_are_numbered():
 
 def test_a_page_of_one_cell_has_no_room():
     with pytest.raises(LayoutError, match="page-numbers: a page of one cell has no room"):
-        encode_text("a", GridShape(3, 2), TextOptions(page_numbers="corner"))
+        encode_text("a", GridShape(3, 2), TextOptions(page_numbers=PageNumbering.CORNER))
     with pytest.raises(LayoutError, match="page_numbers: expected one of none, corner, frame, got 'top'"):
-        TextOptions(page_numbers="top")
+        TextOptions(page_numbers="top")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("where", ["corner", "frame"])
