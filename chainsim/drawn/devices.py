@@ -11,8 +11,9 @@ from ..model.device import Device
 from ..model.surroundings import HigherMode, Surroundings
 from ..threads import in_threads
 from ..time_domain.as_built import AsBuilt
-from ..time_domain.integrate import LONGEST_STEP, limit_of
+from ..time_domain.integrate import limit_of
 from .acting import creep_of, plays_of
+from .composition import DISTINCT, LONGEST_STEP
 from .kernel import ChainSamples, Shared, advance_drawn, flows_of_step
 from .lanes import BETA_RUN, CREEPS, FLOWS_AT, GAIN_RUN, MODES, MOVES_RUN, RUNS, WIDTH
 
@@ -23,6 +24,8 @@ Whole = NDArray[np.int64]
 
 # A factor that a draw would take below this counts as this, so that no number changes its sign.
 _LEAST = 0.01
+# Creep takes a step at least so often: in tau, and in units of its first time.
+_CREEP_STEP, _CREEP_SHARE = 0.25, 0.005
 
 
 class DrawnDevices:
@@ -127,7 +130,7 @@ class DrawnDevices:
         actuators[..., GAIN_RUN, :], actuators[..., BETA_RUN, :] = laid(drawn.lam_gain), laid(drawn.beta)
         actuators[..., MOVES_RUN, :] = 1.0
         flows = flows_of_step(drawn.delta.ravel(), drawn.stiffness.ravel(), step)
-        for run, values in enumerate(flows.reshape(12, *drawn.delta.shape)):
+        for run, values in enumerate(flows.reshape(3 * DISTINCT, *drawn.delta.shape)):
             actuators[..., FLOWS_AT // WIDTH + run, :] = laid(values)
         return work.reshape(blocks, self._chains, -1)
 
@@ -160,11 +163,12 @@ def _shared(device: Device, around: Surroundings, dtau: float, substeps: int, li
     delta, square = np.array([[mode.delta, mode.omega**2] for mode in modes]).T
     flows = flows_of_step(np.ascontiguousarray(delta), np.ascontiguousarray(square), dtau / substeps)
     times = np.full(CREEPS, np.inf) if creep is None else np.array(creep.times)
+    every = 0 if creep is None else max(1, int(min(_CREEP_STEP, _CREEP_SHARE * creep.times[0]) / dtau))
     piezo = np.concatenate([[play.base + sum(play.weight)], play.radius, play.weight, [mode.gain for mode in modes]])
     return Shared(
         dtau, substeps, limit, device.chain.law.closed, around.preload, piezo,
-        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight) or creep is not None,
-        -np.expm1(-dtau / times), 0.0 if creep is None else creep.per_decade / creep.each,
+        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight), every,
+        -np.expm1(-dtau * every / times), 0.0 if creep is None else creep.per_decade / creep.each,
     )  # fmt: skip
 
 

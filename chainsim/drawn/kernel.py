@@ -1,9 +1,9 @@
 """The kernel that moves one chain of WIDTH devices side by side, with what acts on them beside the chain's equation.
 
-The composition is that of `grid_kernels`: oscillator and modes are flows, solved exactly; at every kick all positions
+The composition is as in `grid_kernels`, with fewer kicks: oscillator and modes are flows, solved exactly; at every kick all positions
 stand still, so the tips, the links, the electric force, its hysteresis and the cubic term are known. Play operators are
 pushed at the end of every step, so corners cost an error of second order. Creep, slow beside a sample, is taken by the
-midpoint rule once a sample. An effect that is off has weights of 0.
+midpoint rule once in so many samples. An effect that is off has weights of 0.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..equations.composition import FLOWS, KICK_TIMES, KICKS
 from ..inlined import inlined
 from ..time_domain.splitting import flow
+from .composition import DISTINCT, FLOWS, KICK_TIMES, KICKS
 from .lanes import (
     BETA_RUN,
     FLOWS_AT,
@@ -53,9 +53,10 @@ class Shared(NamedTuple):
     preload : on the first actuator.
     piezo : float64, shape (11,), base and weights of `effects.Play` together, its radii, its weights, and the gains of
         the modes.
-    mode_flows : float64, shape (2, 4, 3), coefficients of the modes' four distinct flows.
-    slow : whether there are plays or creep.
-    creep_steps : float64, shape (7,), share of the way to its end that each relaxation goes in a sample.
+    mode_flows : float64, shape (2, DISTINCT, 3), coefficients of the modes' distinct flows.
+    plays : whether there are any.
+    creep_every : samples from one step of creep to the next, 0 where there is none.
+    creep_steps : float64, shape (7,), share of the way to its end that each relaxation goes in such a step.
     creep_gain : of each.
     """
 
@@ -66,7 +67,8 @@ class Shared(NamedTuple):
     preload: float
     piezo: Floats
     mode_flows: Floats
-    slow: bool
+    plays: bool
+    creep_every: int
     creep_steps: Floats
     creep_gain: float
 
@@ -94,10 +96,10 @@ class ChainSamples(NamedTuple):
 
 @compiled
 def flows_of_step(delta: Floats, stiffness: Floats, step: float) -> Floats:
-    """The four distinct flows of a step: float64, shape (4, 3, N) for N oscillators."""
-    found = np.empty((4, 3, len(delta)))
+    """The distinct flows of a step: float64, shape (DISTINCT, 3, N) for N oscillators."""
+    found = np.empty((DISTINCT, 3, len(delta)))
     for i in range(len(delta)):
-        for k in range(4):
+        for k in range(DISTINCT):
             found[k, 0, i], found[k, 1, i], found[k, 2, i] = flow(delta[i], stiffness[i], FLOWS[k] * step)
     return found
 
@@ -109,10 +111,10 @@ def _step(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared) -
         here = (m + 1) * _SHARE
         own = work[here + FLOWS_AT : here + FLOWS_AT + 3 * WIDTH]
         flow_all(work[here : here + FLOWS_AT], own, modes[0, 0], modes[1, 0])
-    for k in range(7):
+    for k in range(len(KICKS)):
         at, b = (sub + KICK_TIMES[k]) / shared.substeps, KICKS[k] * h
-        # The eight flows of a step are the four distinct ones, there and back.
-        after = k + 1 if k < 3 else 6 - k
+        # The flows of a step are the distinct ones, there and back.
+        after = min(k + 1, len(KICKS) - 1 - k)
         if shared.ring:
             copy(work[:WIDTH], work[n * _SHARE : (n + 1) * _SHARE])
         # From the last one on, so that each finds the tip before it where it was.
@@ -128,8 +130,8 @@ def _step(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared) -
 
 
 @inlined
-def _settle(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared) -> None:
-    """Push the plays at the end of a step; at the end of a sample let creep follow."""
+def _settle(work: Floats, sub: int, s: int, creeps: bool, given: ChainSamples, shared: Shared) -> None:
+    """Push the plays at the end of a step, and let creep follow."""
     n, at = given.force.shape[1], (sub + 1) / shared.substeps
     if shared.ring:
         copy(work[:WIDTH], work[n * _SHARE : (n + 1) * _SHARE])
@@ -139,7 +141,7 @@ def _settle(work: Floats, sub: int, s: int, given: ChainSamples, shared: Shared)
         force = given.force[s, m] + at * (given.force[s + 1, m] - given.force[s, m])
         lam = given.lam[s, m] + at * (given.lam[s + 1, m] - given.lam[s, m])
         push_all(row, work[before : before + WIDTH], made, at, force, lam, shared.piezo)
-        if shared.creep_gain != 0.0 and sub + 1 == shared.substeps:
+        if creeps:
             creep(row, made, shared.creep_steps, shared.creep_gain)
 
 
@@ -182,8 +184,9 @@ def advance_drawn(
                 hiss(row, seeds, sample * given.channels + given.channel[m], given.noise[m])
         for sub in range(shared.substeps):
             _step(work, sub, s, given, shared)
-            if shared.slow:
-                _settle(work, sub, s, given, shared)
+            due = shared.creep_every > 0 and sub + 1 == shared.substeps and (sample + 1) % shared.creep_every == 0
+            if shared.plays or due:
+                _settle(work, sub, s, due, given, shared)
         for m in range(n):
             if given.noise[m] > 0.0:
                 arrive(work[(m + 1) * _SHARE : (m + 1) * _SHARE + FLOWS_AT])

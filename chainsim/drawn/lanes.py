@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inlined import inlined
+from .composition import DISTINCT
 
 __all__ = [
     "BETA_RUN", "CREEPS", "FLOWS_AT", "GAIN_RUN", "MODES", "MOVES_RUN", "PLAYS", "RUNS", "TIP_RUN", "WIDTH", "add",
@@ -34,9 +35,9 @@ _PLAY = _MODE + 2 * MODES * WIDTH
 _CREEP = _PLAY + PLAYS * WIDTH
 
 FLOWS_AT = _CREEP + CREEPS * WIDTH
-"""Where the four distinct flows of the oscillator begin, three coefficients each."""
+"""Where the distinct flows of the oscillator begin, three coefficients each."""
 
-RUNS = FLOWS_AT // WIDTH + 12
+RUNS = FLOWS_AT // WIDTH + 3 * DISTINCT
 
 _GOLDEN, _FIRST_MIX, _SECOND_MIX = (
     np.uint64(word) for word in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)

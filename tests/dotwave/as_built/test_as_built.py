@@ -27,6 +27,8 @@ from dotwave.errors import AppError
 from dotwave.verification import verify
 from drivers import read_waveform
 
+# Units of full scale: many devices move in coarser steps than the one of `verify`.
+FELT = 5e-5
 SPREAD = Surroundings(spread=ActuatorSpread(frequency=0.002, damping=0.02, beta=0.1, lam=0.005))
 
 
@@ -60,7 +62,7 @@ def test_with_nothing_around_it_a_device_feels_as_verify_says(name: str, tmp_pat
     checks = verify(path).frames
     assert len(found) == len(checks)
     for level, check in zip(found, checks, strict=True):
-        assert np.abs(level - check.felt).max() < 1e-9
+        assert np.abs(level - check.felt).max() < FELT
 
 
 def test_bars_of_two_tones_too(tmp_path: Path) -> None:
@@ -68,7 +70,7 @@ def test_bars_of_two_tones_too(tmp_path: Path) -> None:
     bars = {"width": 2.0, "rate_hz": 1.5, "level": 0.4}
     dw.plan(dw.texture({"walking_bars": bars}, device, dwell_s=3.0), device).waveform().write(path)
     found, (check,) = levels(path, Surroundings()).level[0], verify(path).frames
-    assert np.abs(found[0] - check.felt).max() < 1e-9
+    assert np.abs(found[0] - check.felt).max() < FELT
 
 
 def test_a_drawn_device_feels_as_verify_says_of_its_actuators(linked: Path, tmp_path: Path) -> None:
@@ -92,8 +94,7 @@ def test_a_drawn_device_feels_as_verify_says_of_its_actuators(linked: Path, tmp_
         told["device"] = Device.model_validate(told["device"] | {"actuators": actuators}).as_dict()
         copy.with_suffix(".json").write_text(json.dumps(told), "utf-8")
         for level, check in zip(found.level[number], verify(copy).frames, strict=True):
-            # Natural frequencies go through hertz and back.
-            assert np.abs(level - check.felt).max() < 1e-7
+            assert np.abs(level - check.felt).max() < FELT
             assert check.amplitude_error > 0.01
 
 
