@@ -25,7 +25,7 @@ Whole = NDArray[np.int64]
 # A factor that a draw would take below this counts as this, so that no number changes its sign.
 _LEAST = 0.01
 # Creep takes a step at least so often: in tau, and in units of its first time.
-_CREEP_STEP, _CREEP_SHARE = 0.25, 0.005
+_CREEP_STEP, _CREEP_SHARE = 0.25, 0.002
 
 
 class DrawnDevices:

@@ -1,9 +1,9 @@
 """The kernel that moves one chain of WIDTH devices side by side, with what acts on them beside the chain's equation.
 
-The composition is as in `grid_kernels`, with fewer kicks: oscillator and modes are flows, solved exactly; at every kick all positions
-stand still, so the tips, the links, the electric force, its hysteresis and the cubic term are known. Play operators are
-pushed at the end of every step, so corners cost an error of second order. Creep, slow beside a sample, is taken by the
-midpoint rule once in so many samples. An effect that is off has weights of 0.
+The composition is as in `grid_kernels`, with fewer kicks: oscillator and modes are flows, solved exactly; at every kick
+all positions stand still, so the tips, the links, the electric force, its hysteresis and the cubic term are known. Play
+operators are pushed at the end of every step, so corners cost an error of second order. Creep, slow beside a sample, is
+taken by the midpoint rule once in so many samples. An effect that is off has weights of 0.
 """
 
 from __future__ import annotations
