@@ -37,7 +37,7 @@ class DrawnDevices:
     Parameters
     ----------
     device : the profile; actuators that were measured are drawn around what they were measured to be.
-    around : what acts on it; `bandwidth_hz`, `converter_bits` and `row_lam` are not looked at.
+    around : what acts on it; `bandwidth_hz` and `converter_bits` are not looked at.
     first, count : number of the first device, and how many.
     seed : of the draws and of the noise.
     rate_hz : samples a second.
@@ -96,22 +96,25 @@ class DrawnDevices:
         forces = np.concatenate([before[0][:, None], forces[:, skip:]], axis=1)
         links = np.concatenate([before[1][:, None], links[:, skip:]], axis=1)
         self._last = forces[:, -1].copy(), links[:, -1].copy()
-        per_row, first = self._device.chains_per_row, self._done + skip
+        first, basis = self._done + skip, np.repeat(basis[:, skip:], self._device.chains_per_row, axis=0)
         place = np.arange(self._chains * self._n).reshape(self._chains, self._n)
+        # Chains that know nothing of each other are moved one by one.
+        together = self._chains if self._shared.row_lam else 1
 
         def work(part: slice) -> None:
             for unit in range(part.start, part.stop):
-                block, chain = divmod(unit, self._chains)
+                block, number = divmod(unit, self._chains // together)
+                chains = slice(number * together, (number + 1) * together)
                 given = ChainSamples(
-                    forces[chain], links[chain], self._noise[chain], place[chain], place.size, first, frame[skip:],
-                    basis[chain // per_row, skip:],
+                    forces[chains], links[chains], self._noise[chains], place[chains], place.size, first, frame[skip:],
+                    basis[chains],
                 )  # fmt: skip
                 advance_drawn(
-                    self._work[block, chain], self._seeds[block], given, self._shared, self._load[block, chain],
-                    self._escaped[block, chain],
+                    self._work[block, chains], self._seeds[block], given, self._shared, self._load[block, chains],
+                    self._escaped[block, chains],
                 )  # fmt: skip
 
-        in_threads(work, len(self._work) * self._chains, 1)
+        in_threads(work, len(self._work) * self._chains // together, 1)
         self._done += len(force)
 
     def _by_chain(self, values: Floats) -> Floats:
@@ -166,7 +169,7 @@ def _shared(device: Device, around: Surroundings, dtau: float, substeps: int, li
     every = 0 if creep is None else max(1, int(min(_CREEP_STEP, _CREEP_SHARE * creep.times[0]) / dtau))
     piezo = np.concatenate([[play.base + sum(play.weight)], play.radius, play.weight, [mode.gain for mode in modes]])
     return Shared(
-        dtau, substeps, limit, device.chain.law.closed, around.preload, piezo,
+        dtau, substeps, limit, device.chain.law.closed, around.row_lam, device.chains_per_row, around.preload, piezo,
         np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight), every,
         -np.expm1(-dtau * every / times), 0.0 if creep is None else creep.per_decade / creep.each,
     )  # fmt: skip

@@ -135,6 +135,23 @@ def test_without_effects_each_device_is_the_grid(closure: str) -> None:
     assert np.abs(found - z[[1, 60, 399]]).max() < 2e-5 * np.abs(z).max()
 
 
+@pytest.mark.parametrize("around", [Surroundings(), BENT], ids=["nothing else", "modes"])
+def test_rows_are_coupled_as_in_the_grid(around: Surroundings) -> None:
+    """A drive on the first row alone; the grid takes Runge-Kutta steps."""
+    device, samples = device_of(3, delta=0.05), 8001
+    force, lam = driven(device, samples)
+    force[:, 1:] = 0.0
+    coupled = around.model_copy(update={"row_lam": 0.1})
+    found = moved(device, coupled, force, lam, [3000, 8000], count=17, blocks=3)
+    chain = Chain.of(12, delta=device.delta, beta=device.beta, stiffness=1.0, rows=3)
+    setting = Setting.of(chain, epsilon=0.003, lam=np.full((3, 3), 0.3), lam_y=0.1, omega=1.1)
+    terms = Terms(modes=tuple(Mode(one.omega, one.delta, one.gain) for one in around.modes) or None)
+    motion = integrate_terms(chain, setting, terms, duration=40.0, step=0.005, every=1)
+    wanted = motion.tip[np.array([3000, 8000]) - 1].reshape(2, 3, 4)
+    assert np.abs(found[16] - wanted).max() < 5e-6 * np.abs(motion.tip).max()
+    assert np.abs(wanted[:, 2]).max() > 1e-3 * np.abs(motion.tip).max()
+
+
 def test_steps_as_long_as_they_get_are_right_beside_loops_with_corners() -> None:
     """The same lines between samples, by steps as long as they get and by steps an eighth of that."""
     device, samples, finer = device_of(delta=0.05, bias="actuator"), 1201, 8

@@ -114,8 +114,8 @@ def test_memory_does_not_grow_with_the_length_of_a_waveform(linked: Path) -> Non
     assert many % 32 == one % 32 == 0
 
 
-def test_every_value_of_the_surroundings_is_an_effect_or_named_as_left_out() -> None:
-    known = {name for names in EFFECTS.values() for name in names} | {"row_lam"}
+def test_every_value_of_the_surroundings_is_an_effect() -> None:
+    known = {name for names in EFFECTS.values() for name in names}
     assert known == set(Surroundings.model_fields)
     around = surroundings_of(load_device("linked-6x6"))
     assert present(around) == ("spread", "hysteresis", "creep", "higher modes", "amplifier dynamics")
