@@ -21,9 +21,11 @@ from dotwave.as_built.batch import Batch, verdict_on
 from dotwave.as_built.effects import EFFECTS, alone, present
 from dotwave.as_built.motion import FeltLevels, felt_levels, most_at_once
 from dotwave.as_built.report import AsBuiltReport
+from dotwave.as_built.settings import AsBuiltSettings
 from dotwave.as_built.study import AsBuiltStudy, verify_as_built
 from dotwave.as_built.verdict import joined, verdict_of
 from dotwave.errors import AppError
+from dotwave.studies.sweep import run_sweep
 from dotwave.verification import verify
 from drivers import read_waveform
 
@@ -286,3 +288,20 @@ def test_a_cluster_says_the_same(cluster: Any, linked: Path) -> None:
     here = dw.verify(linked, devices=40, seed=2).as_dict()
     there = dw.verify(linked, devices=40, seed=2, scheduler=cluster.scheduler_address).as_dict()
     assert {**here, "seconds": 0} == {**there, "seconds": 0}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default:::distributed")
+@pytest.mark.filterwarnings("default::ResourceWarning")
+@pytest.mark.filterwarnings("default::pytest.PytestUnraisableExceptionWarning")
+def test_a_cluster_sweeps_the_same(cluster: Any, tmp_path: Path) -> None:
+    source = tmp_path / "sweep.yaml"
+    source.write_text(
+        "chain: {n: 2, delta: 0.05, beta: -1.0}\n"
+        "setting: {epsilon: 0.004, lam: 0.02, omega: {from: 0.95, to: 1.0, steps: 3}}\ntol: 1.0e-6\n"
+    )
+    drawn = AsBuiltSettings(small(), 20)
+    run_sweep(source, tmp_path / "here.npz", as_built=drawn, units=1)
+    run_sweep(source, tmp_path / "there.npz", as_built=drawn, units=1, scheduler=cluster.scheduler_address)
+    assert (tmp_path / "here.npz").read_bytes() == (tmp_path / "there.npz").read_bytes()
+    run_sweep(source, tmp_path / "plain.npz", scheduler=cluster.scheduler_address)
