@@ -16,7 +16,7 @@ from chainsim import Chain, Closure, CommonAmplifier, CouplingKind, Device, Draw
 from ..errors import AppError
 from .effects import VARYING, alone, present
 
-__all__ = ["AS_BUILT_FIELDS", "AsBuiltSettings", "Reached"]
+__all__ = ["AS_BUILT_FIELDS", "AsBuiltSettings", "OutcomeOfMany"]
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ COARSEST = 1.0
 
 
 @dataclass(frozen=True)
-class Reached:
+class OutcomeOfMany:
     """What D chains reach at one setting.
 
     outcome : str, shape (D,). amplitude : float64, shape (D, n), of the first harmonic; NaN where one escaped.
@@ -100,7 +100,7 @@ class AsBuiltSettings:
             raise AppError(f"--as-built: {self.device.name} cannot be made of such chains: {first}") from None
 
     def answers(
-        self, chain: Chain, epsilon: Floats, lam: Floats, omega: Floats, nominal: Reached, *, suddenly: bool
+        self, chain: Chain, epsilon: Floats, lam: Floats, omega: Floats, nominal: OutcomeOfMany, *, suddenly: bool
     ) -> dict[str, NDArray[Any]]:
         """`AS_BUILT_FIELDS` of N settings.
 
@@ -124,7 +124,7 @@ class AsBuiltSettings:
             name: np.array(values, dtype=f"<U{width}" if kind is np.str_ else kind) for name, values, kind in columns
         }
 
-    def _reached(self, single: Device, drive: _Drive, effect: str | None) -> Reached:
+    def _reached(self, single: Device, drive: _Drive, effect: str | None) -> OutcomeOfMany:
         around = self.around if effect is None else alone(self.around, effect)
         count = 1
         if effect is None or effect in VARYING:
@@ -139,7 +139,7 @@ class _Drive:
     omega: float
     suddenly: bool
 
-    def reached(self, single: Device, around: Surroundings, count: int, seed: int) -> Reached:
+    def reached(self, single: Device, around: Surroundings, count: int, seed: int) -> OutcomeOfMany:
         """Integrate the full equations until what the beginning stirs up has died down, and look."""
         rate_hz, n = single.amplifier.rate_hz, single.chain_length
         dtau = single.tau_per_s / rate_hz
@@ -186,7 +186,7 @@ def _blocks(samples: int) -> Iterator[NDArray[np.int64]]:
         yield np.arange(first, min(first + BLOCK, samples))
 
 
-def _seen(drawn: DrawnDevices, gram: Floats) -> Reached:
+def _seen(drawn: DrawnDevices, gram: Floats) -> OutcomeOfMany:
     sums = drawn.load[:, :, 0]  # devices, stretches, n, weights
     escaped = (drawn.escaped >= 0) | ~np.isfinite(sums).all(axis=(1, 2, 3))
     sums = np.where(escaped[:, None, None, None], 0.0, sums)
@@ -196,10 +196,10 @@ def _seen(drawn: DrawnDevices, gram: Floats) -> Reached:
     phasor = parts[..., 1] - 1j * parts[..., 2]
     off = np.abs(phasor[1] - phasor[0]).max(axis=1) > AGREE * np.abs(phasor[1]).max(axis=1)
     outcome = np.where(escaped, "escaped", np.where(off, "not_locked", "ok"))
-    return Reached(outcome, np.where(escaped[:, None], np.nan, np.abs(phasor[1])))
+    return OutcomeOfMany(outcome, np.where(escaped[:, None], np.nan, np.abs(phasor[1])))
 
 
-def _judged(each: dict[str | None, Reached], outcome: str, amplitude: Floats) -> tuple[float, int, float, str]:
+def _judged(each: dict[str | None, OutcomeOfMany], outcome: str, amplitude: Floats) -> tuple[float, int, float, str]:
     """`AS_BUILT_FIELDS` of one setting."""
     if outcome not in SEEN:
         return math.nan, -1, math.nan, ""
@@ -213,7 +213,7 @@ def _judged(each: dict[str | None, Reached], outcome: str, amplitude: Floats) ->
     return shares[None], worst, float(known.max()) if len(known) else math.nan, spoiler
 
 
-def _off(reached: Reached, amplitude: Floats) -> Floats:
+def _off(reached: OutcomeOfMany, amplitude: Floats) -> Floats:
     """Median deviation of each actuator over the largest nominal amplitude; NaN where nothing is known."""
     scale = np.abs(amplitude).max()
     known = reached.amplitude[np.isfinite(reached.amplitude).all(axis=1)]

@@ -253,11 +253,11 @@ def answers(
 
 
 def _drawn(sweep: SettingSweep, setting: Setting, found: SweepResult, as_built: AsBuiltSettings) -> Arrays:
-    from ..as_built.settings import Reached
+    from ..as_built.settings import OutcomeOfMany
 
     if np.any(sweep.fixed["preload"]) or np.any(sweep.fixed["bias"]):
         raise AppError("--as-built: expected a drive alone; leave out preload and bias")
-    nominal = Reached(found.outcome_name, np.abs(found.phasor))
+    nominal = OutcomeOfMany(found.outcome_name, np.abs(found.phasor))
     return as_built.answers(
         sweep.chain, setting.epsilon, setting.lam, setting.omega, nominal, suddenly=sweep.from_rest
     )  # fmt: skip

@@ -28,6 +28,7 @@ from dotwave.errors import AppError
 from dotwave.studies.sweep import run_sweep
 from dotwave.verification import verify
 from drivers import read_waveform
+from planner import standing_error
 
 # Units of full scale: many devices move in coarser steps than the one of `verify`.
 FELT = 5e-5
@@ -98,6 +99,29 @@ def test_a_drawn_device_feels_as_verify_says_of_its_actuators(linked: Path, tmp_
         for level, check in zip(found.level[number], verify(copy).frames, strict=True):
             assert np.abs(level - check.felt).max() < FELT
             assert check.amplitude_error > 0.01
+
+
+@pytest.mark.parametrize("name", ["paper-6x6", "paper-6x6-common"])
+def test_the_error_that_is_told_holds_what_the_piezos_do(name: str, tmp_path: Path, dotwave: Any) -> None:
+    """Modes, creep and hysteresis, each alone and all of them together; most of what is told is there."""
+    plan = dw.plan(dw.text("Hi", name), name)
+    told = max(frame.error + standing_error(plan.device, frame.states, frame.end_s) for frame in plan)
+    assert max(frame.error for frame in plan) < 1e-3
+    path = tmp_path / "wave.npz"
+    plan.waveform().write(path)
+    around = surroundings_of(load_device(name))
+    each = [alone(around, effect) for effect in ("higher modes", "creep", "hysteresis")]
+    both = around.model_copy(update={"hysteresis": 0.0, "spread": ActuatorSpread(), "bandwidth_hz": None})
+    manifest, _ = read_waveform(path)
+    found = [
+        float(verdict_of(manifest.frames, levels(path, one)).error.max())
+        for one in (*each, both, around.model_copy(update={"spread": ActuatorSpread()}))
+    ]
+    assert max(found) <= told
+    assert sum(found[:3]) > 0.5 * told
+    bare = load_device(name).model_copy(update={"surroundings": Surroundings()})
+    assert all(standing_error(bare, frame.states, frame.end_s) == 0 for frame in plan)
+    assert f"off by up to {100 * told:.2g} % of full scale" in dotwave("text", "Hi", "-d", name, "--explain").out
 
 
 def test_batches_are_the_whole(linked: Path) -> None:
