@@ -20,6 +20,7 @@ from .analysis.requirement import (
     Term as Term,
     require as require,
 )
+from .analysis.standing import standing_error as standing_error
 from .analysis.tradeoff import (
     Tradeoff as Tradeoff,
     TradeoffChoice as TradeoffChoice,
