@@ -11,6 +11,7 @@ from planner import Measured
 
 from ..errors import DriverError
 from .cobs import DELIMITER
+from .keys import KeyEvent, KeyHearing
 from .measured import MeasuredFrames, MeasuredPart
 from .messages import VERSION, SamplesMessage, StartMessage
 from .outgoing import End, Message
@@ -50,6 +51,8 @@ class Timing:
     hello_s : and greets again after this.
     window : packets under way, at most 32.
     burst_bytes : sent at a time.
+    lead_s : samples are asked for only while fewer seconds of them are ahead of what is played; None: as many as the
+        controller has room for.
     """
 
     heartbeat_s: float = 0.025
@@ -57,6 +60,7 @@ class Timing:
     hello_s: float = 0.25
     window: int = 32
     burst_bytes: int = 1 << 14
+    lead_s: float | None = None
 
 
 @dataclass
@@ -113,6 +117,7 @@ class HostSession:
     session : any number from 1 to 2^32 - 1.
     on_measured : gets what was measured of each frame, in order. A frame whose packets the line lost is not among them,
         and none is where the controller does not measure.
+    on_key : gets every key beside the grid that goes down or up, once and in order.
     """
 
     def __init__(
@@ -122,6 +127,7 @@ class HostSession:
         session: int,
         timing: Timing,
         on_measured: Callable[[Measured], None] | None = None,
+        on_key: Callable[[KeyEvent], None] | None = None,
     ) -> None:
         self._make = make
         self._session = session
@@ -133,6 +139,8 @@ class HostSession:
         self._window = UnderWay(timing.window, timing.resend_s)
         self._next = 0
         self._events = 0
+        self._sampled = 0
+        self._keys, self._on_key, self._key_answer = KeyHearing(), on_key, b""
         self._ack: Ack | None = None
         self._hello_at = self._sent_at = -math.inf
         self._polled_at = math.inf
@@ -183,6 +191,8 @@ class HostSession:
                 self._acknowledged(ack, now)
             elif packet.kind is Kind.MARKED:
                 self._marked(Marked.of(packet), now)
+            elif packet.kind is Kind.KEY:
+                self._pressed(packet)
             elif packet.kind is Kind.MEASURED:
                 self._measured(MeasuredPart.of(packet))
             elif packet.kind is Kind.REFUSED:
@@ -202,7 +212,8 @@ class HostSession:
             return DELIMITER + HELLO
         self.report.longest_pause_s = max(self.report.longest_pause_s, now - self._polled_at)
         self._polled_at = now
-        out = bytearray()
+        out = bytearray(self._key_answer)
+        self._key_answer = b""
         while len(out) < self._timing.burst_bytes:
             wire = self._window.take(now)
             if wire is not None:
@@ -219,7 +230,7 @@ class HostSession:
     def _pull(self) -> bool:
         """Put the next message into the window, if there is one, room and credit."""
         assert self._messages is not None
-        if self._waiting is None:
+        if self._waiting is None and not self._far_ahead:
             self._waiting = next(self._messages, None)
         message, ack = self._waiting, self._ack
         if message is None or self._window.full:
@@ -229,6 +240,7 @@ class HostSession:
             if ack is None or message.first + len(message.codes) > ack.accept_samples:
                 return False
             samples = len(message.codes)
+            self._sampled = message.first + samples
         elif not isinstance(message, StartMessage | End):
             if ack is None or self._events >= ack.accept_events:
                 return False
@@ -237,6 +249,14 @@ class HostSession:
         self._next += 1
         self._waiting = None
         return True
+
+    @property
+    def _far_ahead(self) -> bool:
+        """Whether what follows may wait: what is not asked for yet can still become something else."""
+        if self._timing.lead_s is None or self.capabilities is None:
+            return False
+        played = 0 if self._ack is None else self._ack.played
+        return self._sampled - played >= self._timing.lead_s * self.capabilities.rate_hz
 
     def _greeted(self, found: Capabilities, now: float) -> None:
         if self._phase is not _Phase.GREETING:
@@ -287,6 +307,13 @@ class HostSession:
         wanted_s = (marked.at - first.at) / self.capabilities.rate_hz
         self.report.late_s[marked.frame] = 1e-6 * (marked.clock_us - first.clock_us) - wanted_s
         self.report.reported_late_s[marked.frame] = now - began - wanted_s
+
+    def _pressed(self, packet: Packet) -> None:
+        events = self._keys.take(packet)
+        self._key_answer = encode(self._keys.answer)
+        if self._on_key is not None:
+            for event in events:
+                self._on_key(event)
 
     def _measured(self, part: MeasuredPart) -> None:
         measured = None if self._frames is None else self._frames.take(part)

@@ -25,6 +25,7 @@ __all__ = ["End", "Message", "UnfitController", "check_fit", "session_messages"]
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
+START_FIXED = 17  # bytes before START's note
 
 
 class UnfitController(DriverError, ValueError):
@@ -106,7 +107,7 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
+    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, START_FIXED))
     waiting = merge(
         _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )
