@@ -67,6 +67,10 @@ from .protocol.host_session import (
     StreamReport as StreamReport,
     Timing as Timing,
 )
+from .protocol.keys import (
+    GridKey as GridKey,
+    KeyEvent as KeyEvent,
+)
 from .protocol.outgoing import (
     UnfitController as UnfitController,
     session_messages as session_messages,

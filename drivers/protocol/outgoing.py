@@ -107,7 +107,9 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, START_FIXED))
+    yield StartMessage(
+        session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, START_FIXED)
+    )
     waiting = merge(
         _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )

@@ -1,0 +1,1 @@
+"""Live playing: what comes is felt a moment later, for as long as it stays true."""
