@@ -16,7 +16,7 @@ from .measured import MeasuredFrames, MeasuredPart
 from .messages import VERSION, SamplesMessage, StartMessage
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
-from .replies import Ack, Capabilities, Flag, Marked, Refused, State
+from .replies import OPEN_SINCE, Ack, Capabilities, Flag, Marked, Refused, State
 from .under_way import UnderWay
 
 __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "Timing"]
@@ -24,6 +24,7 @@ __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "T
 HELLO = encode(Packet(Kind.HELLO, 0, VERSION.to_bytes(2, "little")))
 HEARTBEAT = encode(Packet(Kind.HEARTBEAT))
 STOP = encode(Packet(Kind.STOP))
+MOST_LATE = 4096
 
 
 class ControllerRefused(DriverError, ValueError):
@@ -75,7 +76,8 @@ class StreamReport:
     underruns : times the controller's buffer ran dry.
     lost_s : seconds the output was held.
     bad_there, bad_here : frames that were no packet, at the controller and here.
-    late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first.
+    late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first; of
+        the latest `MOST_LATE` frames.
     reported_late_s : the same by the host's clock when the report came, so the line's delay is in it.
     least_buffer_s : smallest store in the controller between its first sample and the last one sent.
     buffer_s : what the controller has room for.
@@ -253,10 +255,13 @@ class HostSession:
     @property
     def _far_ahead(self) -> bool:
         """Whether what follows may wait: what is not asked for yet can still become something else."""
-        if self._timing.lead_s is None or self.capabilities is None:
+        found = self.capabilities
+        if self._timing.lead_s is None or found is None:
             return False
+        # Before there were open sessions, half of the buffer had to be full.
+        least = 0 if found.version >= OPEN_SINCE else found.buffer_samples / 2
         played = 0 if self._ack is None else self._ack.played
-        return self._sampled - played >= self._timing.lead_s * self.capabilities.rate_hz
+        return self._sampled - played >= max(least, self._timing.lead_s * found.rate_hz)
 
     def _greeted(self, found: Capabilities, now: float) -> None:
         if self._phase is not _Phase.GREETING:
@@ -307,6 +312,9 @@ class HostSession:
         wanted_s = (marked.at - first.at) / self.capabilities.rate_hz
         self.report.late_s[marked.frame] = 1e-6 * (marked.clock_us - first.clock_us) - wanted_s
         self.report.reported_late_s[marked.frame] = now - began - wanted_s
+        for late_s in (self.report.late_s, self.report.reported_late_s):
+            if len(late_s) > MOST_LATE:
+                del late_s[next(iter(late_s))]
 
     def _pressed(self, packet: Packet) -> None:
         events = self._keys.take(packet)

@@ -27,6 +27,7 @@ from .coupling import CouplingEvent, CouplingWriter, LamTrack
 
 __all__ = [
     "MOST_BYTES", "SCHEMA", "FrameMark", "HeadingMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open",
+    "frame_entry",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -227,7 +228,7 @@ class ManifestWriter:
             for event in self._coupling.events(frame):
                 self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
             if frame.frame is not None:
-                self._marks.add(_mark(self._device, frame, self.frames))
+                self._marks.add(frame_entry(self._device, frame, self.frames))
                 for heading in frame.frame.headings:
                     place = {"frame": self.frames, "page": frame.frame.page, "start_s": frame.start_s}
                     self._headings.add({"level": heading.level, "text": heading.text} | place)
@@ -285,7 +286,8 @@ class _Spool:
         shutil.copyfileobj(self._file, out)
 
 
-def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
+def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
+    """A frame as it stands in a manifest, `number` in it; raises WaveformError where that cannot say it."""
     assert frame.frame is not None
     assert frame.wish is not None
     per_row = device.chains_per_row

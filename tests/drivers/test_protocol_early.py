@@ -262,7 +262,9 @@ class OldController:
                 )  # fmt: skip
                 self.out += encode(numbers.packet())
             elif packet.kind is Kind.START and packet.number == 0:
-                self.session, self.next = self.session or StartMessage.of(packet).session, max(self.next, 1)
+                start = StartMessage.of(packet)
+                assert start is not None
+                self.session, self.next = self.session or start.session, max(self.next, 1)
             elif packet.kind in (Kind.SAMPLES, Kind.END, Kind.MARK):
                 self.gap = self.gap or packet.number > self.next
                 if packet.number == self.next:
