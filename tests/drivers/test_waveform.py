@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
-from drivers.waveform.sampling import volts_of
 from drivers.waveform.coupling import CouplingWriter, LamTrack
+from drivers.waveform.sampling import volts_of
 from encoders import Frame, TargetPattern
 from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
 from tests.support.known import known

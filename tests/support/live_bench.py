@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,8 +24,19 @@ from drivers import (
 )
 from drivers.protocol.playout import OutputBlock
 from encoders import CellGrid, GridShape
+from planner import FramePlan
 
 STEP_S = 0.001
+
+
+class WatchedCore(LiveCore):
+    """A core that tells of the ways that were begun."""
+
+    going: deque[FramePlan]
+
+    def began(self, placed: FramePlan) -> None:
+        super().began(placed)
+        self.going.append(placed)
 
 
 class LiveBench:
@@ -33,17 +45,19 @@ class LiveBench:
     Attributes
     ----------
     peak_volts, peak_slew : of what went out.
-    blocks : what went out last, at most `keep` blocks.
+    most_stored : samples in the controller at most.
+    latencies_s : from `show` to the moment at which the pattern stood at the controller.
     """
 
     def __init__(
         self, device: Device, *, record: Path | None = None, faults: Faults | None = None, lead_s: float = 0.06,
         idle_s: float = 1.0, limits: GateLimits | None = None, buffer_s: float = 2.0, plans: bool = True,
-        seed: int = 1, version: int | None = None,
+        seed: int = 1,
     ) -> None:  # fmt: skip
         self.now, self.device, self.plans = 100.0, device, plans
         self.cells = CellGrid(GridShape(device.rows, device.cols))
-        self.core = LiveCore(device, idle_s=idle_s, clock=lambda: self.now)
+        self.core = WatchedCore(device, idle_s=idle_s, clock=lambda: self.now)
+        self.core.going = deque()
         self.recorder = None if record is None else ArrivalRecorder(device, record)
         self.spec = ControllerSpec.of(device, buffer_s=buffer_s)
         self.controller = VirtualController(
@@ -64,9 +78,13 @@ class LiveBench:
         self.peak_volts = self.peak_slew = 0.0
         self.last = np.zeros(self.spec.channels)
         self.most_stored = 0
+        self.latencies_s = list[float]()
+        self._asked = dict[str, float]()
         self.session.connected()
 
-    def show(self, cells: str, note: str = "") -> None:
+    def show(self, cells: str, note: str) -> None:
+        """Show cells under a note that no others have."""
+        self._asked[note] = self.now
         self.core.show(self.cells.frame(cells, note))
 
     def run(self, seconds: float, until: Callable[[], bool] | None = None) -> None:
@@ -86,6 +104,13 @@ class LiveBench:
         self.core.played(self.session.played_s)
         playout = self.controller.playout
         self.most_stored = max(self.most_stored, playout.received - playout.played)
+        while self.core.going and self.core.going[0].settled_s * self.spec.rate_hz <= playout.played:
+            self.stood(self.core.going.popleft())
+
+    def stood(self, placed: FramePlan) -> None:
+        """A pattern stands now, by the controller's clock."""
+        if placed.frame is not None:
+            self.latencies_s.append(self.now - self._asked[placed.frame.text])
 
     def _out(self, block: OutputBlock) -> None:
         self.peak_volts = max(self.peak_volts, float(np.abs(block.volts).max()))
