@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -40,6 +41,7 @@ __all__ = ["Live"]
 PATIENCE_S = 10.0
 CLOSING_S = 5.0
 IDLE_PLAN_S = 0.05
+SWITCH_S = 0.0005
 
 
 class Live:
@@ -55,7 +57,7 @@ class Live:
     sink : str or callable
         ``controller:/dev/ttyACM0``, or ``none:`` to play to nobody at the same pace; or what opens a line.
     lead_s : float
-        Seconds of samples that are kept ahead of what is played.
+        Seconds of samples that are kept ahead of what is played; more where a busy machine needs them.
     idle_s : float
         Seconds that a pattern stands after `hold`; then the grid rests.
     on_key : callable, optional
@@ -279,6 +281,9 @@ class Live:
         def line() -> SerialLine:
             return _StoppableLine(first.pop() if first else self._open_line(), self._stop)
 
+        # Planning is one long piece of work; a stream that waits for its turn must get it soon.
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(min(before, SWITCH_S))
         try:
             run_session(self._session, line, patience_s=PATIENCE_S, progress=self._core.played, clock=self._clock)
         except (LiveEnded, _Stopped):
@@ -286,6 +291,7 @@ class Live:
         except DriverError as error:
             self._error = error
         finally:
+            sys.setswitchinterval(before)
             self._ended.set()
             self._core.wake()
 

@@ -6,8 +6,6 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from typing import Any, Protocol
 
-import numpy as np
-
 from chainsim import Device
 from planner import FramePlan
 
@@ -87,6 +85,7 @@ class LiveMessages:
         self._open = found.version >= OPEN_SINCE
         self._again_at = self._frames = 0
         self._silent_until: int | None = None
+        self._refused_from: int | None = None  # since when ways were too much
         self._events: deque[Event] = deque()
         prefill = max(1, round(prefill_s * found.rate_hz)) if self._open else 0
         note = fitting(device_note(device, encoding), found, 21)
@@ -142,24 +141,41 @@ class LiveMessages:
 
     def _try(self, way: FramePlan) -> None:
         """Begin a way that passes the gate as a whole; one that is too much for the time before it waits."""
-        wave, rate = self._wave, self._found.rate_hz
+        wave = self._wave
         placed = wave.placed(way)
         try:
-            self._gate.trial().check(wave.ahead(placed, int(np.ceil(placed.settled_s * rate)) - wave.position + 1))
+            self._check(placed)
         except GateRefusal as refusal:
-            passing = refusal.quantity in WINDOWED
-            if not passing and way.frame is None:
-                raise
-            if not passing:
-                self._source.refused(str(refusal))
-            self._again_at = wave.position + round(AGAIN_S * rate)
+            self._wait(refusal, way)
             return
         links = self._links.events(placed)
         check_links(links, self._limits, refused=REFUSED)
         self._events.extend(self._marked(placed))
         self._events.extend(link_coupling(event, self._found) for event in links)
+        self._refused_from = None
         wave.begin(placed)
         self._source.began(placed)
+
+    def _check(self, placed: FramePlan) -> None:
+        """Hold a way against the gate, with all windows in which its pattern stands; nothing is sent."""
+        gate, window = self._gate.trial(), round(self._limits.window_s * self._found.rate_hz)
+        if any(state.moving for state in placed.states):
+            gate.check(self._wave.ahead(placed, window))
+        else:
+            gate.check(self._wave.ahead(placed, 1))
+            gate.stay(window)
+
+    def _wait(self, refusal: GateRefusal, way: FramePlan) -> None:
+        """Try again soon where time may help; what stands meanwhile is true no longer once a window has passed."""
+        position, rate = self._wave.position, self._found.rate_hz
+        self._again_at = position + round(AGAIN_S * rate)
+        if self._refused_from is None:
+            self._refused_from = position
+        passes = refusal.quantity in WINDOWED
+        if way.frame is None and not passes:
+            raise refusal
+        if way.frame is not None and (not passes or position - self._refused_from > self._limits.window_s * rate):
+            self._source.refused(str(refusal))
 
     def _marked(self, placed: FramePlan) -> Iterator[Event]:
         entry = None if placed.frame is None else frame_entry(self._device, placed, self._frames)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -47,14 +48,23 @@ class LiveWave:
         settled_s = start_s + (way.settled_s - way.start_s)
         return replace(way, start_s=start_s, settled_s=settled_s, end_s=settled_s)
 
-    def ahead(self, placed: FramePlan, count: int) -> Floats:
-        """What a way that is placed would give from the next sample on, float64, shape (count, channels), volts."""
-        return volts_of(self._device, placed, np.arange(self.position, self.position + count)).T
+    def ahead(self, placed: FramePlan, standing: int) -> Floats:
+        """What a way that is placed would give from the next sample on, with `standing` samples of its pattern.
+
+        Returns
+        -------
+        float64, shape (S, channels), volts.
+        """
+        stop = self._settled_at(placed) + standing
+        return volts_of(self._device, placed, np.arange(self.position, stop)).T
 
     def begin(self, placed: FramePlan) -> None:
         """Go the way that was placed last."""
         self._plan, self._held = placed, None
-        self._settled = int(np.ceil(placed.settled_s * self._rate))
+        self._settled = self._settled_at(placed)
+
+    def _settled_at(self, placed: FramePlan) -> int:
+        return math.ceil(placed.settled_s * self._rate)
 
     def block(self, count: int) -> Floats:
         """The next samples; float64, shape (count, channels), volts, read-only."""

@@ -25,6 +25,7 @@ HELLO = encode(Packet(Kind.HELLO, 0, VERSION.to_bytes(2, "little")))
 HEARTBEAT = encode(Packet(Kind.HEARTBEAT))
 STOP = encode(Packet(Kind.STOP))
 MOST_LATE = 4096
+MOST_LEAD_S = 0.48
 
 
 class ControllerRefused(DriverError, ValueError):
@@ -52,8 +53,8 @@ class Timing:
     hello_s : and greets again after this.
     window : packets under way, at most 32.
     burst_bytes : sent at a time.
-    lead_s : samples are asked for only while fewer seconds of them are ahead of what is played; None: as many as the
-        controller has room for.
+    lead_s : samples are asked for only while fewer seconds of them are ahead of what is played, twice as many after
+        each time that was too few; None: as many as the controller has room for.
     """
 
     heartbeat_s: float = 0.025
@@ -141,7 +142,7 @@ class HostSession:
         self._window = UnderWay(timing.window, timing.resend_s)
         self._next = 0
         self._events = 0
-        self._sampled = 0
+        self._sampled, self._lead_s = 0, timing.lead_s
         self._keys, self._on_key, self._key_answer = KeyHearing(), on_key, b""
         self._ack: Ack | None = None
         self._hello_at = self._sent_at = -math.inf
@@ -256,12 +257,12 @@ class HostSession:
     def _far_ahead(self) -> bool:
         """Whether what follows may wait: what is not asked for yet can still become something else."""
         found = self.capabilities
-        if self._timing.lead_s is None or found is None:
+        if self._lead_s is None or found is None:
             return False
         # Before there were open sessions, half of the buffer had to be full.
         least = 0 if found.version >= OPEN_SINCE else found.buffer_samples / 2
         played = 0 if self._ack is None else self._ack.played
-        return self._sampled - played >= max(least, self._timing.lead_s * found.rate_hz)
+        return self._sampled - played >= max(least, self._lead_s * found.rate_hz)
 
     def _greeted(self, found: Capabilities, now: float) -> None:
         if self._phase is not _Phase.GREETING:
@@ -289,6 +290,8 @@ class HostSession:
         self._ack = ack
         self._confirm(ack.next_number, ack.kept or 0, now)
         report = self.report
+        if ack.underruns > report.underruns and self._lead_s is not None:
+            self._lead_s = max(self._lead_s, min(2 * self._lead_s, MOST_LEAD_S))
         report.underruns, report.lost_s, report.bad_there = ack.underruns, ack.held_ms / 1000, ack.bad
         streaming = self._waiting is not None or self._window
         if ack.state is State.PLAYING and ack.played and streaming and self.capabilities is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -93,24 +95,35 @@ class LiveBench:
         while self.now < end and not (until is not None and until()):
             self.step()
 
-    def step(self, plan: bool | None = None) -> None:
+    def step(self) -> None:
+        """A millisecond."""
+        self.stepped_s()
+
+    def stepped_s(self) -> float:
+        """The same; seconds of the processor that the host took."""
         self.now += STEP_S
-        if self.plans if plan is None else plan:
+        before = time.thread_time()
+        if self.plans:
             self.core.plan()
-        self.there.put(self.session.poll(self.now), self.now)
+        out = self.session.poll(self.now)
+        host_s = time.thread_time() - before
+        self.there.put(out, self.now)
         self.controller.receive(self.there.take(self.now), self.now)
         self.back.put(self.controller.outgoing(), self.now)
-        self.session.receive(self.back.take(self.now), self.now)
+        back, before = self.back.take(self.now), time.thread_time()
+        self.session.receive(back, self.now)
         self.core.played(self.session.played_s)
+        host_s += time.thread_time() - before
         playout = self.controller.playout
         self.most_stored = max(self.most_stored, playout.received - playout.played)
         while self.core.going and self.core.going[0].settled_s * self.spec.rate_hz <= playout.played:
             self.stood(self.core.going.popleft())
+        return host_s
 
     def stood(self, placed: FramePlan) -> None:
         """A pattern stands now, by the controller's clock."""
         if placed.frame is not None:
-            self.latencies_s.append(self.now - self._asked[placed.frame.text])
+            self.latencies_s.append(self.now - self._asked.get(placed.frame.text, math.nan))
 
     def _out(self, block: OutputBlock) -> None:
         self.peak_volts = max(self.peak_volts, float(np.abs(block.volts).max()))
