@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+import struct
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +17,7 @@ from chainsim import load_device
 from dotwave.live import core as core_module
 from dotwave.verification import verify
 from drivers import Capabilities, Faults, GateLimits, GateRefusal, KeyEvent, LiveEnded, LiveMessages, read_waveform
-from drivers.protocol.keys import KeyHearing, KeyPacket, KeyWaiting
+from drivers.protocol.keys import GridKey, KeyHearing, KeyPacket, KeyWaiting
 from drivers.protocol.messages import VERSION, SamplesMessage, StartMessage
 from drivers.protocol.outgoing import End
 from drivers.protocol.packet import Kind, Packet, PacketReader, encode
@@ -23,6 +27,7 @@ from planner import frame_change
 from tests.support.live_bench import LiveBench
 from tests.support.wire import SPEC
 
+ROOT = Path(__file__).resolve().parents[2]
 PAPER = load_device("paper-6x6")
 CHANNELS = 42
 
@@ -446,3 +451,41 @@ def test_numbers_of_keys_go_round() -> None:
     assert len(hearing.take(KeyPacket(top, (KeyEvent(1), KeyEvent(2))).packet())) == 2
     assert hearing.take(KeyPacket(top, (KeyEvent(1), KeyEvent(2), KeyEvent(3))).packet()) == (KeyEvent(3),)
     assert hearing.answer.payload == (1).to_bytes(4, "little")
+
+
+def test_the_header_does_as_python_does(tmp_path: Path) -> None:
+    gcc = shutil.which("gcc")
+    if gcc is None:
+        pytest.skip("the C header is checked where there is a gcc")
+    command = [gcc, "-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    command += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I", str(ROOT / "drivers" / "firmware")]
+    subprocess.run([*command, ROOT / "tests" / "data" / "live_harness.c", "-o", tmp_path / "live"], check=True)
+
+    def said(*packets: Packet) -> bytes:
+        sent = b"".join(map(encode, packets))
+        return subprocess.run([tmp_path / "live"], input=sent, capture_output=True, check=True).stdout
+
+    whole = StartMessage(7, False, 8000, 0, b"note", 300).packet(0)
+    short = replace(StartMessage(7, False, 8000, 0, b"", 300).packet(0), payload=whole.payload[:19])
+    starts = [whole, short, StartMessage(7, False, 8000, 500).packet(0), replace(whole, payload=whole.payload[:21])]
+    starts.append(StartMessage(7, False, 8000, 0, b"", 5000).packet(0))
+    numbers = struct.unpack(f"<{2 * len(starts)}I", said(*starts))
+    assert numbers == (1, 300, 0, 0, 1, 1001, 1, 300, 1, 1001)
+
+    waiting, wanted = KeyWaiting(), b""
+    sent = list[Packet]()
+    for number in range(1, 19):
+        event = KeyEvent(number if number % 2 else 256 + number, number % 3 != 0)
+        waiting.press(event, number)
+        told = waiting.due(number)
+        sent.append(Packet(Kind.HEARTBEAT))
+        wanted += struct.pack("<I", number <= 16) + (encode(told) if told is not None else b"")
+    for awaited, left in ((17, 16), (10, 6), (9, 6)):
+        sent.append(Packet(Kind.KEYED, 0, struct.pack("<I", awaited)))
+        waiting.answered(sent[-1])
+        wanted += struct.pack("<I", left)
+    sent.append(Packet(Kind.HELLO, 0, b"\4\0"))
+    assert said(*sent) == wanted + struct.pack("<I", 0)
+    text = (ROOT / "drivers" / "firmware" / "dotwave_live.h").read_text(encoding="utf-8")
+    named = {name: int(code) for name, code in re.findall(r"DW_KEY_([A-Z]+) = (\d+)", text)}
+    assert named == {key.name: key.value for key in GridKey}
