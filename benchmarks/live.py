@@ -19,14 +19,18 @@ import platform
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+if TYPE_CHECKING:
+    from tests.support.live_bench import LiveBench
+
 KEPT = ROOT / "benchmarks" / "results" / "live.json"
 GOALS_S = {"paper-6x6": 0.13, "linked-6x6": 0.42}
 STANDS_S = (0.1, 0.3)
@@ -60,7 +64,7 @@ def measured(name: str, windows: int) -> dict[str, Any]:
             before = time.thread_time()
             bench.core.plan()
             planning.append(time.thread_time() - before)
-            bench.run(3.0, lambda stood=stood: len(bench.latencies_s) > stood)
+            bench.run(3.0, partial(_later, bench, stood))
             latencies.append(bench.latencies_s[-1] + planning[-1])
             bench.run(rng.uniform(*STANDS_S))
         found[round_name] = {
@@ -71,13 +75,17 @@ def measured(name: str, windows: int) -> dict[str, Any]:
     return found | {"windows": windows, "underruns": bench.session.report.underruns}
 
 
+def _later(bench: LiveBench, stood: int) -> bool:
+    return len(bench.latencies_s) > stood
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", action="store_true", help=f"write {KEPT.name}")
     parser.add_argument("--windows", type=int, default=200)
     given = parser.parse_args()
     devices: dict[str, Any] = {}
-    found = {"python": platform.python_version(), "devices": devices}
+    found: dict[str, Any] = {"python": platform.python_version(), "devices": devices}
     with tempfile.TemporaryDirectory() as folder:
         os.environ["DOTWAVE_CACHE"] = folder
         for name in GOALS_S:

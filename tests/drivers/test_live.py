@@ -350,6 +350,10 @@ def greeted(version: int = VERSION) -> VirtualController:
     return controller
 
 
+def state(controller: VirtualController) -> State:
+    return controller.playout.state
+
+
 def samples(first: int, count: int) -> SamplesMessage:
     return SamplesMessage(first, np.full((count, SPEC.channels), 100, dtype=np.int16))
 
@@ -359,15 +363,15 @@ def test_the_clock_starts_at_the_prefill_or_half_of_the_buffer(prefill: int, eno
     controller = greeted()
     start = StartMessage(7, False, SPEC.rate_hz, 0, b"note", prefill)
     answers(controller, 0.0, start.packet(0), samples(0, enough - 1).packet(1))
-    assert controller.playout.state is State.FILLING
+    assert state(controller) is State.FILLING
     answers(controller, 0.0, samples(enough - 1, 1).packet(2))
-    assert controller.playout.state is State.PLAYING
+    assert state(controller) is State.PLAYING
     # After it ran dry too, once the output is at zero.
     controller.tick(0.19)
-    assert controller.playout.state is State.HELD
+    assert state(controller) is State.HELD
     answers(controller, 0.3, Packet(Kind.STATUS))
     answers(controller, 0.3, samples(enough, enough).packet(3))
-    assert controller.playout.state is State.PLAYING
+    assert state(controller) is State.PLAYING
 
 
 def test_the_end_says_how_long_an_open_session_was() -> None:

@@ -31,6 +31,10 @@ def until(there: Callable[[], bool]) -> None:
     assert there()
 
 
+def says(live: dw.Live, note: str) -> Callable[[], bool]:
+    return lambda: live.state.stands is not None and live.state.stands.text == note
+
+
 @contextmanager
 def emulated(record: Path | None = None) -> Iterator[Emulator]:
     device = load_device("paper-6x6")
@@ -57,7 +61,7 @@ def test_windows_and_keys_over_a_line(tmp_path: Path) -> None:
         with dw.Live("paper-6x6", f"controller:{emulator.port}", on_key=keys.append) as live:
             for cells, note in (("⠓⠊", "hi"), ("⠓⠑⠇⠇⠕", "hello")):
                 live.show(cells, note)
-                until(lambda note=note: getattr(live.state.stands, "text", "") == note)
+                until(says(live, note))
             state = live.state
             assert state.connected
             assert state.shown == 2
