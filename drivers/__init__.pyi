@@ -48,6 +48,14 @@ from .formats.wav import (
 from .formats.wav_reader import (
     WavReader as WavReader,
 )
+from .live.loop_line import (
+    LoopLine as LoopLine,
+)
+from .live.messages import (
+    LiveEnded as LiveEnded,
+    LiveMessages as LiveMessages,
+    LiveSource as LiveSource,
+)
 from .protocol.emulator import (
     Emulator as Emulator,
     EmulatorStatus as EmulatorStatus,
@@ -66,6 +74,10 @@ from .protocol.host_session import (
     SessionLost as SessionLost,
     StreamReport as StreamReport,
     Timing as Timing,
+)
+from .protocol.keys import (
+    GridKey as GridKey,
+    KeyEvent as KeyEvent,
 )
 from .protocol.outgoing import (
     UnfitController as UnfitController,
@@ -131,6 +143,7 @@ from .sinks.opening import (
 )
 from .sinks.serial_play import (
     NoAnswer as NoAnswer,
+    SerialLine as SerialLine,
     run_session as run_session,
 )
 from .sinks.tactile_board import (

@@ -5,6 +5,10 @@ from .braille.back_check import (
     back_check as back_check,
     back_translate as back_translate,
 )
+from .braille.cell_grid import (
+    CellGrid as CellGrid,
+    are_cells as are_cells,
+)
 from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,

@@ -66,6 +66,7 @@ from .identification.page_choice import (
 from .identification.stages import (
     SensorNoise as SensorNoise,
 )
+from .live_plan import LivePlan as LivePlan, LiveWay as LiveWay
 from .operating_point import (
     Margins as Margins,
     OperatingPoint as OperatingPoint,

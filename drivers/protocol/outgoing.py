@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..channels import Role
+from chainsim import Device
+
+from ..channels import Channel, Role, channels_of
 from ..errors import DriverError
 from ..formats.samples import SampleReader
+from ..waveform.coupling import CouplingEvent
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
 from .measured import Measure, turns_of
-from .messages import FULL_CODE, VERSION, LinkCoupling, Mark, SamplesMessage, StartMessage
+from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
 from .replies import Capabilities
 
-__all__ = ["End", "Message", "UnfitController", "check_fit", "session_messages"]
+__all__ = [
+    "Coder", "End", "Message", "UnfitController", "block_of", "check_fit", "check_fit_for", "fitting", "link_coupling",
+    "session_messages",
+]  # fmt: skip
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
+START_FIXED = 17  # bytes before START's note
 
 
 class UnfitController(DriverError, ValueError):
@@ -56,8 +64,12 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
     UnfitController
         With the first thing that differs.
     """
-    device = manifest.device
     lam_max = max((max(event.lam, default=0.0) for event in manifest.coupling), default=0.0)
+    check_fit_for(manifest.device, found, lam_max)
+
+
+def check_fit_for(device: Device, found: Capabilities, lam_max: float) -> None:
+    """The same for any waveform of `device` whose links go up to `lam_max`."""
     if not 1 <= found.version <= VERSION:
         raise UnfitController(
             f"controller {found.name!r}: it speaks protocol version {found.version}, dotwave {VERSION} and older; "
@@ -66,8 +78,8 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
     for name, wanted, have in (
         ("rows", device.rows, found.rows),
         ("columns", device.cols, found.cols),
-        ("channels", len(manifest.channels), found.channels),
-        ("samples per second", manifest.rate_hz, found.rate_hz),
+        ("channels", len(channels_of(device)), found.channels),
+        ("samples per second", device.amplifier.rate_hz, found.rate_hz),
         ("bits per sample", 16, found.bits),
     ):
         if wanted != have:
@@ -106,40 +118,66 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, _fitting(scene_note(manifest), found, 17))
+    yield StartMessage(
+        session, False, manifest.rate_hz, manifest.samples, fitting(scene_note(manifest), found, START_FIXED)
+    )
     waiting = merge(
         _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )
     event = next(waiting, None)
-    most = SamplesMessage.most(found.channels, found.max_payload)
-    block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * manifest.rate_hz)))
-    drives = [channel.index for channel in manifest.channels if channel.role is Role.DRIVE]
-    shaper, first = Shaper(len(drives)), 0
-    for volts in reader.blocks(block):
+    coder, first = Coder(manifest.channels, found.full_volts), 0
+    for volts in reader.blocks(block_of(found)):
         while event is not None and event.at < first + len(volts):
             yield event
             event = next(waiting, None)
-        codes = volts * (FULL_CODE / found.full_volts)
-        codes[:, drives] = shaper.round(codes[:, drives].T).T
-        codes = np.rint(codes).clip(-FULL_CODE, FULL_CODE)
-        yield SamplesMessage(first, codes.astype(np.int16))
+        yield SamplesMessage(first, coder.codes(volts))
         first += len(volts)
     yield End(first)
+
+
+def block_of(found: Capabilities) -> int:
+    """How many samples of all channels go into a packet."""
+    most = SamplesMessage.most(found.channels, found.max_payload)
+    return max(1, min(most, found.buffer_samples // 8, round(PACKET_S * found.rate_hz)))
+
+
+class Coder:
+    """Samples as codes: drives with the error pushed up in frequency, constant voltages the nearest.
+
+    Parameters
+    ----------
+    channels : what each column of a block is.
+    full_volts : volts of code `FULL_CODE`.
+    """
+
+    def __init__(self, channels: Sequence[Channel], full_volts: float) -> None:
+        self._drives = [channel.index for channel in channels if channel.role is Role.DRIVE]
+        self._shaper, self._per_volt = Shaper(len(self._drives)), FULL_CODE / full_volts
+
+    def codes(self, volts: NDArray[np.float64]) -> Codes:
+        """The next samples, float64, shape (S, channels), volts."""
+        codes = volts * self._per_volt
+        codes[:, self._drives] = self._shaper.round(codes[:, self._drives].T).T
+        return np.rint(codes).clip(-FULL_CODE, FULL_CODE).astype(np.int16)
 
 
 def _links(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     # Events go by time; in the manifest they do so within each row only.
     for event in sorted(manifest.coupling, key=lambda event: event.t_s):
-        at = round(event.t_s * manifest.rate_hz)
-        ramp = max(0, round((event.t_s + event.ramp_s) * manifest.rate_hz) - at)
-        step = found.lam_step or 1.0
-        codes = tuple(min(65535, round(lam / step)) for lam in event.lam)
-        yield LinkCoupling(at, event.row, ramp, codes)
+        yield link_coupling(event, found)
+
+
+def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling:
+    """Links that move, as a controller is told of them."""
+    at = round(event.t_s * found.rate_hz)
+    ramp = max(0, round((event.t_s + event.ramp_s) * found.rate_hz) - at)
+    step = found.lam_step or 1.0
+    return LinkCoupling(at, event.row, ramp, tuple(min(65535, round(lam / step)) for lam in event.lam))
 
 
 def _marks(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     for number, mark in enumerate(manifest.frames):
-        yield Mark(round(mark.start_s * manifest.rate_hz), number, _fitting(frame_note(mark), found, 12))
+        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, 12))
 
 
 def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
@@ -162,6 +200,6 @@ def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
             yield Measure(at, stop - at, number, tuple(turns))
 
 
-def _fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:
+def fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:
     """The note, or nothing when it is too long for a packet: it is for recorders only."""
     return note if fixed + len(note) <= found.max_payload else b""

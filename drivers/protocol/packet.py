@@ -37,6 +37,7 @@ class Kind(IntEnum):
     STATUS = 0x02
     HEARTBEAT = 0x03
     STOP = 0x04
+    KEYED = 0x05
     START = 0x10
     COUPLING = 0x11
     BIAS = 0x12
@@ -50,6 +51,7 @@ class Kind(IntEnum):
     MARKED = 0x83
     REFUSED = 0x84
     MEASURED = 0x85
+    KEY = 0x86
 
 
 ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.MEASURE)
@@ -67,6 +69,7 @@ SHAPES = {
     Kind.STATUS: Shape(0, 0),
     Kind.HEARTBEAT: Shape(0, 0),
     Kind.STOP: Shape(0, 0),
+    Kind.KEYED: Shape(4, 0),
     Kind.START: Shape(17, 1),
     Kind.COUPLING: Shape(14, 2),
     Kind.BIAS: Shape(18, 0),
@@ -80,6 +83,7 @@ SHAPES = {
     Kind.MARKED: Shape(20, 0),
     Kind.REFUSED: Shape(4, 1),
     Kind.MEASURED: Shape(10, 12),
+    Kind.KEY: Shape(4, 2),
 }
 
 

@@ -143,12 +143,14 @@ class Playout:
         self._total: int | None = None
         self._ended = False
         self.parametric = False
+        self._enough = self._spec.buffer_samples / 2
         self.received = self.played = self.events_done = self.underruns = 0
         self.held_s = 0.0
 
-    def begin(self, parametric: bool) -> None:
-        """A stream is to come; every link goes to 0."""
+    def begin(self, parametric: bool, prefill: int = 0) -> None:
+        """A stream is to come, of which `prefill` samples are enough to play (0: half a buffer); links go to 0."""
         self.clear()
+        self._enough = min(self._enough, prefill or self._enough)
         self._lam = [Glide.still(np.zeros(self._spec.cols - 1)) for _ in self._lam]
         self.parametric = parametric
         self.state = State.FILLING
@@ -185,8 +187,8 @@ class Playout:
         if self.state not in (State.FILLING, State.HELD) or not self.silent or not self.alive:
             return
         stored = self.received - self.played
-        half = 2 * stored >= self._spec.buffer_samples or 2 * len(self._events) >= self._spec.event_slots
-        if self._ended or half:
+        enough = stored >= self._enough or 2 * len(self._events) >= self._spec.event_slots
+        if self._ended or enough:
             self.state = State.PLAYING
 
     def hold(self, state: State = State.HELD) -> None:

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Protocol
 
 from .early import EarlyPackets
+from .keys import KeyEvent, KeyWaiting
 from .measured import Measure, parts_of
 from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
 from .metering import Meter, Senses
@@ -22,6 +23,7 @@ from .replies import Ack, Capabilities, Flag, Refused, State
 __all__ = ["Recorder", "VirtualController"]
 
 ACK_EVERY_S = 0.02
+KEYS_SINCE = 4  # the version from which on a host is told of keys
 
 
 class Recorder(Protocol):
@@ -80,6 +82,7 @@ class VirtualController:
         self._recorder = recorder
         self._reader = PacketReader()
         self._early = EarlyPackets(spec.early_packets)
+        self._keys = KeyWaiting()
         self._version = 1
         self._next = 0
         self._events = 0
@@ -115,8 +118,15 @@ class VirtualController:
         if self.session and now - self._ack_at >= ACK_EVERY_S:
             self._ack_due = True
 
+    def press(self, key: KeyEvent) -> None:
+        """A key beside the grid went down or up; a host that knows of keys is told until it has it."""
+        if self._version >= KEYS_SINCE:
+            self._keys.press(key, self._now)
+
     def outgoing(self) -> bytes:
         """The bytes to send to the host, once."""
+        if (keys := self._keys.due(self._now)) is not None:
+            self._send(keys)
         if self._ack_due:
             self._send(self._ack().packet())
             self._ack_due = self._gap = False
@@ -146,12 +156,15 @@ class VirtualController:
         if packet.kind is Kind.HELLO:
             # A host that has not greeted, or only knows version 1, gets the ACK of version 1.
             self._version = max(1, min(VERSION, int.from_bytes(packet.payload, "little")))
+            self._keys.clear()
             self._send(self._capabilities().packet())
         elif packet.kind is Kind.STOP:
             self.playout.hold(State.STOPPED)
             self.playout.clear()
             self._forget()
             self.session, self._ack_due = 0, True
+        elif packet.kind is Kind.KEYED:
+            self._keys.answered(packet)
         elif packet.kind in (Kind.STATUS, Kind.HEARTBEAT):
             self._ack_due = True
         elif packet.kind in ORDERED:
@@ -161,7 +174,7 @@ class VirtualController:
     def _take_ordered(self, packet: Packet) -> None:
         if packet.kind is Kind.START:
             start = StartMessage.of(packet)
-            if packet.number != 0 or start.session in (0, self.session):
+            if start is None or packet.number != 0 or start.session in (0, self.session):
                 return
             self._try(packet.number, lambda: self._start(start))
         elif not self.session or packet.number > self._next:
@@ -187,7 +200,7 @@ class VirtualController:
     def _start(self, start: StartMessage) -> None:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
-        self.playout.begin(start.parametric)
+        self.playout.begin(start.parametric, start.prefill)
         self._forget()
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
@@ -255,8 +268,9 @@ class VirtualController:
                 raise _Refusal(f"channels 0..{spec.channels - 1}, at most {spec.full_volts:g} V in all")
 
     def _end(self, total: int) -> None:
-        if total != self._total or (not self.playout.parametric and total != self.playout.received):
-            raise _Refusal(f"the end at sample {total}, where {self.playout.received} of {self._total} are here")
+        announced = self._total or total
+        if total != announced or (not self.playout.parametric and total != self.playout.received):
+            raise _Refusal(f"the end at sample {total}, where {self.playout.received} of {announced} are here")
         self.playout.end(total)
         if self._recorder is not None:
             self._recorder.end()
