@@ -43,6 +43,7 @@ class CanuteDisplay:
         self._columns, self._rows = columns, rows
         self._cells = bytearray(columns * rows)
         self._keys = 0
+        self._driven = False
         self._frame = bytearray()
         self._escaped = self._spoiled = False
 
@@ -77,8 +78,11 @@ class CanuteDisplay:
         return self.idle()
 
     def idle(self) -> bytes:
-        """Keys, unasked: said every some milliseconds, a driver writes sooner than it would ask."""
-        return _framed(_PRESSED, self._keys)
+        """Keys, unasked: said every some milliseconds, a driver writes sooner than it would ask.
+
+        Nothing until it writes: before, it asks who is there, and takes no other answer.
+        """
+        return _framed(_PRESSED, self._keys) if self._driven else b""
 
     def _ended(self) -> bytes:
         frame, spoiled = bytes(self._frame), self._spoiled or self._escaped
@@ -91,9 +95,11 @@ class CanuteDisplay:
     def _answered(self, asked: int, data: bytes) -> bytes:
         values = {_COLUMNS: self._columns, _ROWS: self._rows, _PROTOCOL: 1, _STATUS: 0, _PRESSED: self._keys}
         if asked in values:
+            self._driven &= asked != _COLUMNS
             return _framed(asked, values[asked])
         if asked == _FIRMWARE:
             return _enclosed(bytes([asked]) + b"dotwave")
+        self._driven |= asked in (_ROW, _RESET)
         if asked == _ROW:
             self._written(data)
         elif asked == _RESET:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from chainsim import Device, load_device
-from drivers import atomic_file, naming
+from drivers import KeyEvent, atomic_file, naming
 from encoders import GridShape, TextOptions, resolve_tables
 
 from ..errors import AppError
@@ -221,15 +221,18 @@ def _secret(path: Path | None) -> bytes | None:
 def _run(profile: Device, fold: GridFold, port: WindowPort, options: LiveOptions, out: TextIO | None) -> LiveReport:
     sink = "none:" if options.to == "none" else options.to
     idle_s = _AFTER_REPLAY_S if isinstance(port, ReplayPort) else options.idle_s
-    session: LiveSession | None = None
+    sessions: list[LiveSession] = []
+
+    def pressed(event: KeyEvent) -> None:
+        for session in sessions:
+            session.on_grid_key(event)
+
     with ExitStack() as stack:
         key_file = None if options.key_file is None else KeyFile(options.key_file)
         if key_file is not None:
             stack.callback(key_file.close)
         writer = stack.enter_context(_writer(options.record, profile, port, fold))
-        live = stack.enter_context(
-            Live(profile, sink, idle_s=idle_s, on_key=lambda event: session and session.on_grid_key(event))
-        )
+        live = stack.enter_context(Live(profile, sink, idle_s=idle_s, on_key=pressed))
         terminal = TerminalKeys() if port.kind != WindowSource.LINES else None
         if terminal is not None:
             stack.callback(terminal.close)
@@ -237,6 +240,7 @@ def _run(profile: Device, fold: GridFold, port: WindowPort, options: LiveOptions
         session = LiveSession(
             port, live, fold, blink=options.cursor, writer=writer, mirror=mirror, key_file=key_file, terminal=terminal
         )
+        sessions.append(session)
         # Ctrl-C is how such a session ends.
         with suppress(KeyboardInterrupt):
             asyncio.run(session.run(_say))
