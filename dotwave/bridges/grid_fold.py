@@ -47,7 +47,7 @@ class GridFold:
         return cell // self.per_line, cell % self.per_line
 
     def braille(self, window: BrailleWindow, cursor_drawn: bool = False) -> str:
-        """What is felt, as Unicode Braille: dots that a cell has not are left out.
+        """What is felt, all cells of the grid as Unicode Braille: dots that a cell has not are left out.
 
         Parameters
         ----------
@@ -55,8 +55,8 @@ class GridFold:
         cursor_drawn : whether the cursor, where there is one, covers its cell now.
         """
         mask = 0x3F if self.dots == 6 else 0xFF
-        cells = bytearray(bits & mask for bits in window.cells[: self.capacity])
-        if cursor_drawn and window.cursor is not None and window.cursor < len(cells):
+        cells = bytearray(bits & mask for bits in window.cells[: self.capacity].ljust(self.capacity, b"\0"))
+        if cursor_drawn and window.cursor is not None and window.cursor < self.capacity:
             cells[window.cursor] = _covered(cells[window.cursor], 0x3F if self.dots == 6 else 0xC0)
         return braille_of(bytes(cells))
 

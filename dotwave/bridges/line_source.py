@@ -6,7 +6,7 @@ from functools import cached_property
 
 from encoders import EmptyText, EncodeError, GridShape, TextOptions, encode_text
 
-from .window import BLANK_CELL, BrailleWindow, Key, KeyName, cells_of_braille
+from .window import BrailleWindow, Key, KeyName, cells_of_braille
 
 __all__ = ["LineSource"]
 
@@ -89,8 +89,6 @@ class _Line:
         except EncodeError as error:
             # A line of a script is no reason to end: it says what is wrong, and the next may be better.
             return (BrailleWindow(b"", note=f"lines: {error}"),)
-        blank = chr(BLANK_CELL)
-        return tuple(
-            BrailleWindow(cells_of_braille(frame.cells.replace("\n", "") or blank), frame.text, note="lines")
-            for frame in frames
-        )
+        pages = (cells_of_braille(frame.cells.replace("\n", "")) for frame in frames)
+        windows = [BrailleWindow(cells, frame.text, note="lines") for cells, frame in zip(pages, frames, strict=True)]
+        return tuple(windows) or (BrailleWindow(b"", note="lines"),)

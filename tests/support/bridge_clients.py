@@ -11,7 +11,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -154,10 +154,8 @@ def running(
         yield RunningSession(session, grid, parts["loop"])
     finally:
         if running_on.is_alive():
-            try:
+            with suppress(RuntimeError):
                 parts["loop"].call_soon_threadsafe(parts["task"].cancel)
-            except RuntimeError:
-                pass
         running_on.join(PATIENCE_S)
     if wrong:
         raise wrong[0]

@@ -17,6 +17,8 @@ from dotwave.bridges.grid_fold import GridFold
 from dotwave.bridges.pty_port import PtyPort
 from tests.support.bridge_clients import (
     CONSOLE,
+    BrlapiProcess,
+    RunningSession,
     brlapi_client,
     brltty,
     free_number,
@@ -95,12 +97,12 @@ def test_a_text_console_on_every_bridge_at_once(tmp_path: Path) -> None:
             # BRLTTY draws the cursor into the cells of a display: it stands in the sixth.
             CONSOLE.write_text(f"\033c{words}\033[1;6H")
             for live in grids:
-                until(lambda live=live, cells=cells: live.grid.last[:5] == cells, live.grid)
+                stands(live, cells)
         for live in grids:
             live.press("next")
-            until(lambda live=live: live.grid.last == "⠞⠓⠑⠗⠑⠀", live.grid)
+            stands(live, "⠞⠓⠑⠗⠑⠀")
             live.press("previous")
-            until(lambda live=live: live.grid.last[:5] == "⠓⠑⠇⠇⠕", live.grid)
+            stands(live, "⠓⠑⠇⠇⠕")
 
 
 @needs_brltty
@@ -117,7 +119,11 @@ def test_brltty_on_a_display(driver: str, tmp_path: Path) -> None:
         until(lambda: live.grid.held)
 
 
-def checked(live, client, *, routing: bool = True) -> None:
+def stands(live: RunningSession, begin: str) -> None:
+    until(lambda: live.grid.last.startswith(begin), live.grid)
+
+
+def checked(live: RunningSession, client: BrlapiProcess, *, routing: bool = True) -> None:
     until(lambda: client.ask("get", "displaySize") == [6, 1], "the display's size")
     client.ask("enterTtyModeWithPath", [])
     client.ask("writeText", "Hello")
