@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from drivers import KeyEvent
@@ -212,7 +213,7 @@ class LiveSession:
 
 
 async def _wait(news: asyncio.Event, seconds: float) -> None:
-    try:
-        await asyncio.wait_for(news.wait(), seconds)
-    except TimeoutError:
-        return
+    # Not `wait_for`, which in Python 3.11 loses a Ctrl-C that comes with the news.
+    with suppress(TimeoutError):
+        async with asyncio.timeout(seconds):
+            await news.wait()

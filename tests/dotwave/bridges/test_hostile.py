@@ -148,7 +148,7 @@ def test_fuzzed_lines(count: int) -> None:
             lines.press(Key(chance.choice(list(KeyName))))
 
     flat(work, count)
-    assert looks == 4
+    assert looks >= 3
     lines.receive(b"\ngood\n")
     assert lines.window is not None
     assert lines.window.text == "good"

@@ -256,6 +256,21 @@ def test_a_system_without_such_pipes_says_so() -> None:
         asyncio.run(serve_pipe(object(), lambda: BrlapiLine(BrlapiPort(server()))))  # type: ignore[arg-type]
 
 
+def test_ctrl_c_that_comes_with_news_is_not_lost() -> None:
+    port = Told()
+
+    async def run() -> None:
+        task = asyncio.create_task(session_module.LiveSession(port, ListeningGrid(), NARROW).run(lambda line: None))
+        await asyncio.sleep(0.01)
+        port.changed()
+        task.cancel()
+        done, _ = await asyncio.wait([task], timeout=5)
+        task.cancel()
+        assert done
+
+    asyncio.run(run())
+
+
 def test_a_grid_that_fails_ends_the_session_with_its_error() -> None:
     class Failing(ListeningGrid):
         def show(self, what: str, note: str | None = None) -> None:
