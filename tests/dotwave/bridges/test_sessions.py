@@ -56,8 +56,8 @@ def test_windows_keys_and_what_stood_are_recorded_and_mirrored(tmp_path: Path) -
     port, file, out = Told(), BytesIO(), StringIO()
     (tmp_path / "keys").write_text("")
     writer = SessionWriter(file, "linked-6x6", "told", 6, 1)
-    options = {"writer": writer, "mirror": LiveMirror(out, 3), "key_file": KeyFile(tmp_path / "keys")}
-    with running(port, NARROW, **options) as live:
+    options: dict[str, Any] = {"mirror": LiveMirror(out, 3), "key_file": KeyFile(tmp_path / "keys")}
+    with running(port, NARROW, writer=writer, **options) as live:
         port.now = BrailleWindow(b"\x13\x0a", "hi", 1, "client 1")
         live.loop.call_soon_threadsafe(port.changed)
         until(lambda: "hi" in out.getvalue())
