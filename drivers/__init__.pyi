@@ -99,6 +99,7 @@ from .protocol.playout import (
 )
 from .protocol.pty_line import (
     PtyUnavailable as PtyUnavailable,
+    make_link as make_link,
 )
 from .protocol.record import (
     ArrivalRecorder as ArrivalRecorder,

@@ -267,7 +267,7 @@ def doctor(as_json: Json = False) -> None:
 @cache
 def application() -> typer.Typer:
     """All commands."""
-    for name in ("pictures", "study", "plan", "play"):
+    for name in ("pictures", "study", "plan", "play", "live"):
         app.add_typer(import_module(f".{name}", __package__).commands)
     return app
 
