@@ -89,7 +89,7 @@ class AsBuiltSettings:
         ):  # fmt: skip
             raise AppError("--as-built: expected an open chain or a ring of equal oscillators over resistors")
         coupling = {"scope": "chain", "closure": chain.closure.value, "lam": {"min": 0.0, "max": 1.0}}
-        changes = {
+        changes: dict[str, Any] = {
             "rows": 1, "cols": chain.n, "chain_length": chain.n, "delta": chain.delta, "beta": chain.beta,
             "coupling": coupling if chain.n > 1 else {"scope": "none"}, "actuators": [], "spread": None, "notes": {},
         }  # fmt: skip
@@ -159,7 +159,7 @@ class _Drive:
         amplifier, gram = CommonAmplifier(single, around), np.zeros((2, 3, 3))
         rise = 0.0 if self.suddenly else settling
         for index in _blocks(first + 2 * look):
-            tau = dtau * index
+            tau = dtau * index.astype(np.float64)
             frame = np.where(index < first, -1, np.where(index < first + look, 0, 1))
             basis = np.stack([np.ones(len(tau)), np.cos(self.omega * tau), np.sin(self.omega * tau)], axis=1)
             for number in range(2):

@@ -15,7 +15,7 @@ from encoders import TargetPattern
 from planner import FramePlan, Plan
 
 from ..errors import AppError
-from ..reports.printable import Printable
+from ..plain import Printable
 from ..request import Request
 
 if TYPE_CHECKING:

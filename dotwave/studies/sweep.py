@@ -144,7 +144,7 @@ def run_sweep(
 
 def _fields(only: tuple[str, ...] | None, as_built: AsBuiltSettings | None) -> tuple[str, ...]:
     """Which are written, in order."""
-    there = FIELDS
+    there: tuple[str, ...] = FIELDS
     if as_built is not None:
         from ..as_built.settings import AS_BUILT_FIELDS
 

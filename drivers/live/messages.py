@@ -17,7 +17,7 @@ from ..protocol.record import device_note, live_note
 from ..protocol.replies import OPEN_SINCE, Capabilities
 from ..safety import Gate, GateLimits, GateRefusal, check_links
 from ..waveform.coupling import CouplingWriter
-from ..waveform.manifest import frame_entry
+from ..waveform.frame_entry import frame_entry
 from .wave import LiveWave
 
 __all__ = ["LiveEnded", "LiveMessages", "LiveSource"]

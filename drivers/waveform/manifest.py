@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, BinaryIO
@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
 from encoders import GoesOn, PageNumber
-from planner import FramePlan, FrameWish, OperatingPoint
+from planner import FramePlan, FrameWish
 
 from ..channels import Channel, channels_of
 from ..errors import UnreadableWaveform, WaveformError
 from ..files.whole import naming
 from .coupling import CouplingEvent, CouplingWriter, LamTrack
+from .frame_entry import frame_entry
 
 __all__ = [
     "MOST_BYTES", "SCHEMA", "FrameMark", "HeadingMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open",
@@ -36,7 +37,6 @@ SCHEMA = "dotwave/waveform/1"
 MOST_BYTES = 500_000_000
 # Of it, what stands beside frames and coupling.
 REST_BYTES = 10_000_000
-DIGITS = 12  # significant digits of a target in the file
 ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False)
 
 
@@ -228,7 +228,7 @@ class ManifestWriter:
             for event in self._coupling.events(frame):
                 self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
             if frame.frame is not None:
-                self._marks.add(_mark(self._device, frame, self.frames))
+                self._marks.add(frame_entry(self._device, frame, self.frames))
                 for heading in frame.frame.headings:
                     place = {"frame": self.frames, "page": frame.frame.page, "start_s": frame.start_s}
                     self._headings.add({"level": heading.level, "text": heading.text} | place)
@@ -284,65 +284,6 @@ class _Spool:
     def copy_to(self, out: BinaryIO) -> None:
         self._file.seek(0)
         shutil.copyfileobj(self._file, out)
-
-
-def _mark(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
-    assert frame.frame is not None
-    assert frame.wish is not None
-    per_row = device.chains_per_row
-    rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
-    places = [f"frame {number}, row {index}" for index in range(device.rows)]
-    moving = [_moving(row, place) for row, place in zip(rows, places, strict=True)]
-    mark = {
-        "start_s": frame.start_s,
-        "settled_s": frame.settled_s,
-        "end_s": frame.end_s,
-        "moving": moving,
-        "omega": [
-            _common_omega(row, place) if moves else 0.0 for row, place, moves in zip(rows, places, moving, strict=True)
-        ],
-        "target": [[_rounded(v) for state in row for v in state.target.tolist()] for row in rows],
-        "wish": [[None if np.isnan(v) else _rounded(v) for v in row] for row in frame.wish.level.tolist()],
-        "cells": frame.frame.cells,
-        "text": frame.frame.text,
-        "outcome": frame.outcome.value,
-        "page": frame.frame.page,
-        "span": list(frame.frame.span),
-    }
-    goes_on, page_number = [asdict(one) for one in frame.frame.goes_on], frame.frame.number
-    rare = {"contrast_db": frame.wish.contrast_db, "goes_on": goes_on, "number": page_number and asdict(page_number)}
-    mark |= {key: value for key, value in rare.items() if value}
-    if any(state.tones for state in frame.states):
-        mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
-    if any(state.phase is not None for state in frame.states):
-        mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]
-    if frame.spread is not None:
-        mark["spread"] = frame.spread.as_dict()
-    return mark
-
-
-def _moving(states: tuple[OperatingPoint, ...], place: str) -> bool:
-    moving = any(state.moving for state in states)
-    if moving and any(np.any(state.bias) for state in states):
-        raise WaveformError(f"{place}: some of its chains vibrate and some stand still")
-    return moving
-
-
-def _phases(state: OperatingPoint) -> list[float | None]:
-    if state.phase is None:
-        return [None] * len(state.target)
-    return [None if np.isnan(phase) else _rounded(phase) for phase in state.phase.tolist()]
-
-
-def _common_omega(states: tuple[OperatingPoint, ...], place: str) -> float:
-    driven = {state.omega for state in states if state.epsilon} or {states[0].omega}
-    if len(driven) > 1:
-        raise WaveformError(f"{place}: its chains are driven at omega {sorted(driven)}; plan one omega for a row")
-    return float(driven.pop())
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
 
 
 def _json(value: object) -> bytes:

@@ -43,7 +43,7 @@ def test_with_nothing_around_them_all_are_the_chain_itself(from_rest: bool) -> N
 
 
 def test_a_ring_too() -> None:
-    ring = dw.Chain(n=3, delta=0.05, beta=-1.0, closure="ring")
+    ring = dw.Chain.of(3, delta=0.05, beta=-1.0, closure="ring")
     found = dw.sweep(ring, epsilon=0.002, lam=0.01, omega=0.97, tol=1e-8, as_built=device(), devices=1)
     assert float(np.ravel(found["yield"])[0]) == 1
     assert float(np.ravel(found["deviation"])[0]) < 1e-3
