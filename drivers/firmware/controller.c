@@ -5,22 +5,27 @@
 #include "board.h"
 #include "dotwave_decoder.h"
 #include "dotwave_early.h"
+#include "dotwave_live.h"
 #include "playout.h"
 #include "session.h"
 
-#define VERSION 3u
+#define VERSION 5u
+#define KEYS_SINCE 4u
+#define KEYS_EVERY_US 50000u
 #define ACK_EVERY_US 20000u
 #define LONGEST_REPLY 256u /* no packet of a controller that does not measure is longer on the line */
 
 static dw_decoder line;
 static dw_early early;
 static uint8_t version, gap, ack_due;
-static uint64_t acked_at;
+static uint64_t acked_at, keys_due_at;
+static dw_keys keys;
 
 void dw_init(void)
 {
     memset(&line, 0, sizeof line);
     dw_early_clear(&early);
+    memset(&keys, 0, sizeof keys);
     memset(&dw_now, 0, sizeof dw_now);
     version = 1;
     gap = ack_due = 0;
@@ -141,7 +146,7 @@ static int tried(const dw_packet *packet)
 static void take_start(const dw_packet *packet)
 {
     uint32_t session = dw_u32(packet->payload);
-    if (packet->number != 0 || session == 0 || session == dw_now.session) return;
+    if (!dw_start_fits(packet) || packet->number != 0 || session == 0 || session == dw_now.session) return;
     if (tried(packet)) dw_early_clear(&early);
 }
 
@@ -177,8 +182,10 @@ static void take(const dw_packet *packet)
         version = (uint8_t)dw_u16(packet->payload);
         if (dw_u16(packet->payload) > VERSION) version = VERSION;
         if (version < 1u) version = 1;
+        dw_keys_clear(&keys);
         tell_capabilities();
         return;
+    case DW_KEYED: dw_keyed(&keys, packet); return;
     case DW_STOP: stop(); break;
     case DW_START: take_start(packet); break;
     case DW_STATUS:
@@ -203,6 +210,20 @@ static void tell_full(void)
     board_unlock();
 }
 
+void dw_key(uint16_t code, int down)
+{
+    if (version >= KEYS_SINCE && dw_press(&keys, code, down)) keys_due_at = board_clock_us();
+}
+
+static void tell_keys(uint64_t now_us)
+{
+    uint8_t p[DW_KEYS_MOST];
+    uint32_t length = now_us >= keys_due_at ? dw_keys_payload(&keys, p) : 0;
+    if (!length) return;
+    reply(DW_KEY, p, length);
+    keys_due_at = now_us + KEYS_EVERY_US;
+}
+
 void dw_poll(void)
 {
     int byte;
@@ -214,6 +235,7 @@ void dw_poll(void)
     board_lock();
     dw_start_if_ready();
     board_unlock();
+    tell_keys(now_us);
     if (dw_now.session && now_us - acked_at >= ACK_EVERY_US) ack_due = 1;
     if (ack_due) tell_ack(now_us);
 }

@@ -18,4 +18,7 @@ void dw_poll(void);
 /* One sample goes out. */
 void dw_play(void);
 
+/* A key beside the grid went down (1) or up (0); codes are those of dotwave_live.h. */
+void dw_key(uint16_t code, int down);
+
 #endif

@@ -54,17 +54,16 @@ void dw_clear(void)
     store_read = store_write = 0;
 #endif
     gain = DW_RAMP_SAMPLES;
-    enough = DW_BUFFER_SAMPLES - DW_BUFFER_SAMPLES / 2u;
     dw_out.total = dw_out.received = dw_out.played = dw_out.held = 0;
     dw_out.events_done = dw_out.underruns = 0;
     dw_out.ended = dw_out.parametric = dw_out.full = 0;
 }
 
-void dw_begin(uint64_t total, int parametric, uint32_t prefill)
+void dw_begin(uint64_t total, int parametric, uint32_t begin_with)
 {
     dw_clear();
     dw_links_zero();
-    if (prefill && prefill < enough) enough = prefill;
+    enough = begin_with;
     dw_out.total = total;
     dw_out.parametric = (uint8_t)(parametric != 0);
     dw_out.state = DW_FILLING;

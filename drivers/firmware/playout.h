@@ -52,7 +52,7 @@ void dw_play(void);
 
 /* For the main loop, with the interrupt locked away. */
 void dw_playout_init(void);
-void dw_begin(uint64_t total, int parametric, uint32_t prefill);
+void dw_begin(uint64_t total, int parametric, uint32_t begin_with);
 void dw_clear(void);
 void dw_hold(enum dw_state state);
 void dw_heard(void);

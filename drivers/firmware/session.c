@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "dotwave_live.h"
 #include "numbers.h"
 #include "playout.h"
 
@@ -27,7 +28,7 @@ int dw_begin_session(const dw_packet *packet, dw_text *why)
     uint32_t rate_hz = dw_u32(packet->payload + 5);
     if (rate_hz != DW_RATE_HZ)
         return refused_numbers(why, "the rate is ", DW_RATE_HZ, " Hz, not ", rate_hz, "");
-    dw_begin(dw_u64(packet->payload + 9), packet->payload[4] != 0, 0);
+    dw_begin(dw_u64(packet->payload + 9), packet->payload[4] & DW_PARAMETRIC, dw_enough(packet, DW_BUFFER_SAMPLES));
     dw_now.session = dw_u32(packet->payload);
     dw_now.events = 0;
     return 1;
@@ -55,10 +56,10 @@ static int take_samples(const dw_packet *packet, dw_text *why)
 
 static int take_end(const dw_packet *packet, dw_text *why)
 {
-    uint64_t total = dw_u64(packet->payload);
-    if (total != dw_out.total || (!dw_out.parametric && total != dw_out.received)) {
+    uint64_t total = dw_u64(packet->payload), announced = dw_out.total ? dw_out.total : total;
+    if (total != announced || (!dw_out.parametric && total != dw_out.received)) {
         refused_numbers(why, "the end at sample ", total, ", where ", dw_out.received, " of ");
-        dw_say_number(why, dw_out.total);
+        dw_say_number(why, announced);
         return refused(why, " are here");
     }
     dw_end(total);

@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivers.protocol.keys import KeyEvent
+
 ROOT = Path(__file__).parents[2] / "drivers" / "firmware"
 SANITIZED = "-O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all"
 LIMIT_S = 600
@@ -48,14 +50,16 @@ class Answer:
 
 @dataclass(frozen=True)
 class Request:
-    """Time goes on to `now_us`, then `data` comes."""
+    """Time goes on to `now_us`, keys go down or up, then `data` comes."""
 
     now_us: int
     data: bytes = b""
+    keys: tuple[KeyEvent, ...] = ()
 
     def packed(self) -> bytes:
         """As a build with its time given reads it."""
-        return struct.pack("<QI", self.now_us, len(self.data)) + self.data
+        keys = [key.wire for key in self.keys]
+        return struct.pack(f"<QII{len(keys)}H", self.now_us, len(self.data), len(keys), *keys) + self.data
 
 
 def need(*programs: str) -> None:

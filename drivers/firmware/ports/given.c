@@ -1,6 +1,7 @@
 /* A board whose time is given: for tests, on any target with a standard library.
  *
- * Reads requests, {u64 now_us, u32 length, bytes}: time goes on to now_us, sample by sample, then the bytes come. Answers
+ * Reads requests, {u64 now_us, u32 length, u32 keys, u16 each, bytes}: time goes on to now_us, sample by sample, keys go
+ * down or up (bit 15), then the bytes come. Answers
  * each with {u32 length, bytes sent}, {u32 samples} and for each {u8 changed links' rows; for each row u8, codes}, codes.
  * Without arguments it talks over stdin and stdout, with two it reads a file of requests and writes one of answers.
  */
@@ -79,21 +80,33 @@ static void put32(uint32_t value)
     fwrite(bytes, 1, 4, answers);
 }
 
-static int exchange(void)
+static void play_until(uint64_t until)
 {
-    uint8_t head[12];
-    uint64_t until;
-    if (fread(head, 1, 12, requests) != 12) return 0;
-    until = dw_u64(head);
-    coming_length = dw_u32(head + 8);
-    coming_at = 0;
-    if (coming_length > MOST_BYTES || fread(coming, 1, coming_length, requests) != coming_length) return 0;
     while ((samples_out + 1u) * 1000000u <= until * DW_RATE_HZ) {
         now_us = samples_out * 1000000u / DW_RATE_HZ;
         dw_play();
         samples_out++;
     }
     now_us = until;
+}
+
+static int exchange(void)
+{
+    uint8_t head[16], key[2];
+    uint32_t keys;
+    uint64_t until;
+    if (fread(head, 1, 16, requests) != 16) return 0;
+    until = dw_u64(head);
+    coming_length = dw_u32(head + 8);
+    coming_at = 0;
+    keys = dw_u32(head + 12);
+    if (coming_length > MOST_BYTES) return 0;
+    play_until(until);
+    for (; keys; keys--) {
+        if (fread(key, 1, 2, requests) != 2) return 0;
+        dw_key(dw_u16(key) & 0x7fffu, !(key[1] & 0x80u));
+    }
+    if ( fread(coming, 1, coming_length, requests) != coming_length) return 0;
     /* A main loop that is quick: it takes all that came before time goes on. */
     do dw_poll();
     while (coming_at < coming_length);

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from drivers.protocol.envelope import LONGEST_PIECE, Envelope
+from drivers.protocol.keys import GridKey, KeyEvent, keyed
 from drivers.protocol.measured import Measure, turns_of
 from drivers.protocol.messages import Bias, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones, WireTone
 from drivers.protocol.outgoing import End
@@ -26,17 +27,17 @@ def hello(version: int) -> bytes:
 class Talk:
     """Requests in the making: time in ms, a little beside the samples so that no rounding decides."""
 
-    def __init__(self, version: int | None = 3) -> None:
+    def __init__(self, version: int | None = 5) -> None:
         self.requests: list[Request] = []
         self.ms = 0.0
         self.number = 0
         if version is not None:
             self.say(hello(version))
 
-    def say(self, *data: bytes, wait_ms: float = 0.0) -> Talk:
-        """After a while, bytes."""
+    def say(self, *data: bytes, wait_ms: float = 0.0, keys: tuple[KeyEvent, ...] = ()) -> Talk:
+        """After a while, keys and bytes."""
         self.ms += wait_ms
-        self.requests.append(Request(round(self.ms * 1000) + 60, b"".join(data)))
+        self.requests.append(Request(round(self.ms * 1000) + 60, b"".join(data), keys))
         return self
 
     def order(self, *messages: Any, wait_ms: float = 0.0) -> Talk:
@@ -55,10 +56,12 @@ class Talk:
             self.say(BEAT, wait_ms=every_ms)
         return self.say(STATUS, wait_ms=end - self.ms)
 
-    def start(self, total: int, *, parametric: bool = False, session: int = 7, rate_hz: int = RATE_HZ) -> Talk:
+    def start(
+        self, total: int, *, parametric: bool = False, session: int = 7, rate_hz: int = RATE_HZ, prefill: int = 0
+    ) -> Talk:
         """A new session."""
         self.number = 0
-        return self.order(StartMessage(session, parametric, rate_hz, total))
+        return self.order(StartMessage(session, parametric, rate_hz, total, b"note", prefill))
 
 
 def codes(count: int, seed: int = 1) -> np.ndarray:
@@ -72,7 +75,7 @@ def cut(block: np.ndarray, first: int = 0) -> list[SamplesMessage]:
 
 def greeting() -> Talk:
     talk = Talk(None).say(STATUS).say(BEAT, wait_ms=3)
-    for version in (0, 1, 2, 3, 65535):
+    for version in (0, 1, 2, 3, 4, 5, 256, 65535):
         talk.say(hello(version), STATUS, wait_ms=5)
     return talk
 
@@ -252,6 +255,34 @@ def greeted_again() -> Talk:
     return talk.say(hello(3), wait_ms=5).order(*cut(codes(1100), 900), wait_ms=1).say(hello(2))
 
 
+def open_session() -> Talk:
+    talk, block = Talk().start(0, prefill=160), codes(480)
+    talk.order(SamplesMessage(0, block[:150]), wait_ms=1).order(SamplesMessage(150, block[150:200]), wait_ms=3)
+    talk.order(SamplesMessage(200, block[200:240]), wait_ms=20).beat(40)
+    return talk.order(SamplesMessage(240, block[240:]), wait_ms=80).order(End(480), wait_ms=3).beat(200)
+
+
+def open_parametric_session() -> Talk:
+    talk = Talk().start(0, parametric=True).order(*(Bias(50 * k, 0, 50, 9.0 * k) for k in range(8)), wait_ms=1)
+    return talk.beat(100).order(End(900), wait_ms=1).beat(150)
+
+
+def prefill_that_is_not_there() -> Talk:
+    start = StartMessage(7, False, RATE_HZ, 100, prefill=50).packet(0)
+    short = Packet(start.kind, 0, start.payload[:-1])
+    return Talk().say(encode(short), STATUS, wait_ms=1)
+
+
+def keys() -> Talk:
+    down, up = KeyEvent(GridKey.NEXT), KeyEvent(GridKey.NEXT, False)
+    talk = Talk(None).say(STATUS, wait_ms=1, keys=(down,)).say(hello(3)).say(STATUS, wait_ms=1, keys=(down,))
+    talk.say(hello(4)).say(STATUS, wait_ms=1, keys=(down, up)).say(STATUS, wait_ms=30).say(STATUS, wait_ms=21)
+    talk.say(encode(keyed(1)), wait_ms=5).say(STATUS, wait_ms=46).say(encode(keyed(9)), wait_ms=1, keys=(down,))
+    talk.say(encode(keyed(3)), wait_ms=1).say(STATUS, wait_ms=60)
+    talk.say(BEAT, wait_ms=1, keys=tuple(KeyEvent.over(cell) for cell in range(18)))
+    return talk.say(hello(5), wait_ms=2).say(BEAT, wait_ms=51, keys=(up,))
+
+
 REFUSALS: dict[str, Callable[[], Talk]] = {
     "samples of another count": refused(Raw(Kind.SAMPLES, bytes(8) + b"\x03\0" + bytes(8))),
     "no samples": refused(Raw(Kind.SAMPLES, bytes(10))),
@@ -286,5 +317,6 @@ EXCHANGES: dict[str, Callable[[], Talk]] = {
     "early for version 1": early_for_version_1, "too early": too_early, "starts": starts, "wrong rate": wrong_rate,
     "marks": marks, "too many events": too_many_events, "links": links, "biases": biases, "tones": tones,
     "envelopes": envelopes, "silence": silence, "silence of tones": silence_of_tones, "underrun": underrun,
-    "late end": late_end, "stop": stop, "greeted again": greeted_again, **REFUSALS,
+    "late end": late_end, "open session": open_session, "open parametric session": open_parametric_session,
+    "prefill that is not there": prefill_that_is_not_there, "keys": keys, "stop": stop, "greeted again": greeted_again, **REFUSALS,
 }  # fmt: skip

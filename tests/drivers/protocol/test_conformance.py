@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from drivers.protocol.keys import KeyPacket
 from drivers.protocol.packet import Kind, Packet, PacketReader
 from drivers.protocol.playout import OutputBlock
 from drivers.protocol.replies import Ack, Capabilities, Flag, Marked, Refused
@@ -50,6 +51,9 @@ def _line(packet: Packet) -> str:
     if packet.kind is Kind.MARKED:
         marked = Marked.of(packet)
         return f"MARKED {marked.frame} at {marked.at}; {marked.clock_us} us"
+    if packet.kind is Kind.KEY:
+        keys = KeyPacket.of(packet)
+        return f"KEY {keys.first}: {' '.join(f'{key.wire:04x}' for key in keys.events)}"
     refused = Refused.of(packet)
     return f"REFUSED {refused.number}: {refused.why}"
 
@@ -60,6 +64,9 @@ def virtual(requests: list[Request]) -> tuple[list[list[str]], Played]:
     controller = VirtualController(SPEC, now=0.0, name="trial", on_output=blocks.append)
     lines = []
     for request in requests:
+        controller.tick(request.now_us * 1e-6)
+        for key in request.keys:
+            controller.press(key)
         controller.receive(request.data, request.now_us * 1e-6)
         lines.append(told(controller.outgoing()))
     codes = np.concatenate([np.zeros((0, SPEC.channels)), *(block.volts for block in blocks)]) * 32767 / SPEC.full_volts
