@@ -2,8 +2,8 @@
  *
  *     controller [--link PATH] [--record FILE]
  *
- * prints the name of its port. PATH becomes a symbolic link to it; FILE gets what goes out while a session plays: for
- * each sample {u64 of the session, links of all rows u16 ..., codes i16 ...}. Ends on SIGTERM and SIGINT.
+ * prints the name of its port. PATH becomes a symbolic link to it; FILE gets what goes out while
+ * a session plays (vectors.h). Ends on SIGTERM and SIGINT.
  */
 #define _XOPEN_SOURCE 700
 
@@ -21,8 +21,7 @@
 #include "board.h"
 #include "config.h"
 #include "controller.h"
-#include "dotwave_decoder.h"
-#include "playout.h"
+#include "vectors.h"
 
 #define STEP_MS 1
 #define BYTES_READ 65536u
@@ -35,7 +34,6 @@ static FILE *record;
 static uint8_t coming[BYTES_READ], pending[BYTES_PENDING];
 static uint32_t coming_at, coming_length, pending_length;
 static uint64_t now_us, samples_out;
-static uint16_t links[DW_ROWS][DW_LINKS];
 
 uint64_t board_clock_us(void) { return now_us; }
 void board_lock(void) {}
@@ -56,18 +54,13 @@ void board_send(const uint8_t *bytes, uint32_t length)
 
 void board_links(uint32_t row, const uint16_t *codes)
 {
-    memcpy(links[row], codes, sizeof links[row]);
+    vector_keep(row, codes);
 }
 
 void board_write(const int16_t *codes)
 {
-    uint8_t bytes[8 + 2 * DW_ROWS * DW_LINKS + 2 * DW_CHANNELS], *p = bytes + 8;
-    if (!record || dw_out.state != DW_PLAYING) return;
-    dw_put64(bytes, dw_out.played - 1u);
-    for (uint32_t row = 0; row < DW_ROWS; row++)
-        for (uint32_t i = 0; i < DW_LINKS; i++, p += 2) dw_put16(p, links[row][i]);
-    for (uint32_t i = 0; i < DW_CHANNELS; i++, p += 2) dw_put16(p, (uint16_t)codes[i]);
-    if (fwrite(bytes, 1, sizeof bytes, record) != sizeof bytes) ended = 1;
+    uint8_t bytes[VECTOR_BYTES];
+    if (record && vector_put(bytes, codes) && fwrite(bytes, 1, sizeof bytes, record) != sizeof bytes) ended = 1;
 }
 
 static uint64_t real_us(void)

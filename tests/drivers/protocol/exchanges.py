@@ -318,5 +318,6 @@ EXCHANGES: dict[str, Callable[[], Talk]] = {
     "marks": marks, "too many events": too_many_events, "links": links, "biases": biases, "tones": tones,
     "envelopes": envelopes, "silence": silence, "silence of tones": silence_of_tones, "underrun": underrun,
     "late end": late_end, "open session": open_session, "open parametric session": open_parametric_session,
-    "prefill that is not there": prefill_that_is_not_there, "keys": keys, "stop": stop, "greeted again": greeted_again, **REFUSALS,
+    "prefill that is not there": prefill_that_is_not_there, "keys": keys, "stop": stop,
+    "greeted again": greeted_again, **REFUSALS,
 }  # fmt: skip
