@@ -75,25 +75,25 @@ static void step(cubic *c)
     c->second += c->third;
 }
 
+static int32_t sine(uint32_t turn)
+{
+    uint32_t into = turn & 0x3fffffffu, index;
+    int64_t low, high;
+    int32_t wave;
+    if (turn & 0x40000000u) into = 0x40000000u - into;
+    index = into >> 21;
+    low = dw_sine_table[index];
+    high = dw_sine_table[index < 512u ? index + 1u : index];
+    wave = (int32_t)(low + (((high - low) * (int64_t)(into & 0x1fffffu)) >> 21));
+    return turn & 0x80000000u ? -wave : wave;
+}
+
 dw_phasor dw_turned(uint64_t phase)
 {
     dw_phasor both;
-    int32_t wave[2];
-    for (uint32_t i = 0; i < 2; i++) {
-        /* The cosine is the sine a quarter later. */
-        uint32_t turn = (uint32_t)((phase + (i ? 0 : (uint64_t)1 << 62)) >> 32), quarter = turn >> 30;
-        uint32_t into = turn & 0x3fffffffu, index, rest;
-        int64_t low, high;
-        if (quarter & 1u) into = 0x40000000u - into;
-        index = into >> 21;
-        rest = into & 0x1fffffu;
-        low = dw_sine_table[index];
-        high = dw_sine_table[index < 512u ? index + 1u : index];
-        wave[i] = (int32_t)(low + (((high - low) * (int64_t)rest) >> 21));
-        if (quarter & 2u) wave[i] = -wave[i];
-    }
-    both.re = wave[0];
-    both.im = wave[1];
+    uint32_t turn = (uint32_t)(phase >> 32);
+    both.re = sine(turn + 0x40000000u); /* the cosine is the sine a quarter later */
+    both.im = sine(turn);
     return both;
 }
 
@@ -210,7 +210,7 @@ void dw_voices_step(int64_t *sum)
         int32_t re;
         if (v->use == FREE) continue;
         re = lowered(v->re.value);
-        if (v->turns || v->use != BIAS) {
+        if (v->turns) {
             dw_phasor wave = dw_turned(v->phase);
             int64_t turned = (int64_t)re * wave.re - (int64_t)lowered(v->im.value) * wave.im;
             re = (int32_t)floor_shift(turned + ((int64_t)1 << 29), 30);
@@ -219,7 +219,7 @@ void dw_voices_step(int64_t *sum)
         sum[v->channel] += re;
         if (v->left) {
             step(&v->re);
-            step(&v->im);
+            if (v->turns) step(&v->im);
             if (--v->left == 0) stand(v);
         }
     }

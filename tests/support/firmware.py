@@ -6,7 +6,7 @@ import shutil
 import struct
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -62,6 +62,9 @@ class Request:
         return struct.pack(f"<QII{len(keys)}H", self.now_us, len(self.data), len(keys), *keys) + self.data
 
 
+OFF_AND_ON = struct.pack("<QII", 0, 0xFFFFFFFF, 0)
+
+
 def need(*programs: str) -> None:
     """Skip the test where one of these is not installed."""
     for program in programs:
@@ -95,7 +98,7 @@ def built(target: str, grid: str, options: str = "", flags: str = "") -> Path:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return out / target / (f"{grid}.elf" if target.startswith("cortex-m") else grid)
+    return out / target / (grid if target in ("posix", "given") else f"{grid}.elf")
 
 
 class GivenProgram:
@@ -116,6 +119,12 @@ class GivenProgram:
         self._process.stdout.close()
         assert self._process.wait(LIMIT_S) == 0
 
+    def restart(self) -> None:
+        """Switch the controller off and on."""
+        assert self._process.stdin
+        self._process.stdin.write(OFF_AND_ON)
+        self._links[:] = 0
+
     def ask(self, request: Request) -> Answer:
         """One request and its answer."""
         assert self._process.stdin
@@ -125,23 +134,24 @@ class GivenProgram:
         return _answer(self._process.stdout.read, self._grid, self._links)
 
 
-def run_in_emulator(image: Path, grid: Grid, requests: Iterable[Request], folder: Path) -> list[Answer]:
-    """All requests at once to the Cortex-M image whose time is given, under QEMU."""
+def run_in_emulator(image: Path, grid: Grid, talks: Sequence[Sequence[Request]], folder: Path) -> list[list[Answer]]:
+    """All requests at once to the Cortex-M image whose time is given, under QEMU; it is restarted before each talk."""
     need("qemu-system-arm")
     asked, answered = folder / "requests", folder / "answers"
-    asked.write_bytes(b"".join(request.packed() for request in requests))
+    asked.write_bytes(b"".join(OFF_AND_ON + b"".join(one.packed() for one in talk) for talk in talks))
     config = f"enable=on,target=native,arg=given,arg={asked},arg={answered}"
     command = ["qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-serial", "none", "-monitor", "none"]
     done = subprocess.run(
         [*command, "-semihosting-config", config, "-kernel", image], capture_output=True, timeout=LIMIT_S, check=False
     )
     assert done.returncode == 0, done.stderr
-    links = np.zeros((grid.rows, grid.links), dtype=np.int64)
     with answered.open("rb") as file:
-        answers = []
-        while file.peek(1):
-            answers.append(_answer(file.read, grid, links))
-    return answers
+        return [_answers(file.read, grid, len(talk)) for talk in talks]
+
+
+def _answers(read: Callable[[int], bytes], grid: Grid, count: int) -> list[Answer]:
+    links = np.zeros((grid.rows, grid.links), dtype=np.int64)
+    return [_answer(read, grid, links) for _ in range(count)]
 
 
 def _answer(read: Callable[[int], bytes], grid: Grid, links: NDArray[np.int64]) -> Answer:

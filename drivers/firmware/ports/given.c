@@ -1,7 +1,7 @@
 /* A board whose time is given: for tests, on any target with a standard library.
  *
  * Reads requests, {u64 now_us, u32 length, u32 keys, u16 each, bytes}: time goes on to now_us, sample by sample, keys go
- * down or up (bit 15), then the bytes come. Answers
+ * down or up (bit 15), then the bytes come. A length of 2^32 - 1 switches it off and on, and has no answer. Answers
  * each with {u32 length, bytes sent}, {u32 samples} and for each {u8 changed links' rows; for each row u8, codes}, codes.
  * Without arguments it talks over stdin and stdout, with two it reads a file of requests and writes one of answers.
  */
@@ -15,6 +15,7 @@
 #include "dotwave_decoder.h"
 
 #define MOST_BYTES (1u << 20)
+#define OFF_AND_ON 0xffffffffu
 
 static FILE *requests, *answers;
 static uint8_t coming[MOST_BYTES], sent[MOST_BYTES];
@@ -90,6 +91,14 @@ static void play_until(uint64_t until)
     now_us = until;
 }
 
+static int begin(void)
+{
+    now_us = samples_out = 0;
+    coming_length = coming_at = sent_length = record_length = vectors = 0;
+    dw_init();
+    return 1;
+}
+
 static int exchange(void)
 {
     uint8_t head[16], key[2];
@@ -100,13 +109,14 @@ static int exchange(void)
     coming_length = dw_u32(head + 8);
     coming_at = 0;
     keys = dw_u32(head + 12);
+    if (coming_length == OFF_AND_ON) return begin();
     if (coming_length > MOST_BYTES) return 0;
     play_until(until);
     for (; keys; keys--) {
         if (fread(key, 1, 2, requests) != 2) return 0;
         dw_key(dw_u16(key) & 0x7fffu, !(key[1] & 0x80u));
     }
-    if ( fread(coming, 1, coming_length, requests) != coming_length) return 0;
+    if (fread(coming, 1, coming_length, requests) != coming_length) return 0;
     /* A main loop that is quick: it takes all that came before time goes on. */
     do dw_poll();
     while (coming_at < coming_length);
@@ -124,7 +134,7 @@ int main(int argc, char **argv)
     requests = argc == 3 ? fopen(argv[1], "rb") : stdin;
     answers = argc == 3 ? fopen(argv[2], "wb") : stdout;
     if (!requests || !answers) return 2;
-    dw_init();
+    begin();
     while (exchange()) {
     }
     return argc == 3 && fclose(answers) ? 1 : 0;

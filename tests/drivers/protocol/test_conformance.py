@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -80,17 +80,19 @@ def played(answers: list[Answer]) -> Played:
     return codes, np.concatenate([answer.links for answer in answers]).astype(np.float64)
 
 
-def by_program(requests: list[Request]) -> list[Answer]:
+@pytest.fixture(scope="module")
+def program() -> Iterator[GivenProgram]:
     """The firmware as a program of this machine, with its reads and writes watched."""
-    with GivenProgram(built("given", "trial", flags=SANITIZED), TRIAL) as program:
-        return [program.ask(request) for request in requests]
+    with GivenProgram(built("given", "trial", flags=SANITIZED), TRIAL) as running:
+        yield running
 
 
-@pytest.fixture(scope="session")
-def by_emulator(tmp_path_factory: pytest.TempPathFactory) -> Callable[[list[Request]], list[Answer]]:
-    """The firmware on an emulated Cortex-M."""
-    image = built("cortex-m-given", "trial")
-    return lambda requests: run_in_emulator(image, TRIAL, requests, tmp_path_factory.mktemp("emulated"))
+@pytest.fixture(scope="module")
+def by_emulator(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Answer]]:
+    """What the firmware on an emulated Cortex-M answers to all of them."""
+    image, talks = built("cortex-m-given", "trial"), [talk().requests for talk in EXCHANGES.values()]
+    answers = run_in_emulator(image, TRIAL, talks, tmp_path_factory.mktemp("emulated"))
+    return dict(zip(EXCHANGES, answers, strict=True))
 
 
 def expected(name: str) -> list[list[str]]:
@@ -118,13 +120,14 @@ def test_python_answers_so(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", EXCHANGES)
-def test_the_program_answers_so(name: str) -> None:
-    compare(name, by_program(EXCHANGES[name]().requests))
+def test_the_program_answers_so(name: str, program: GivenProgram) -> None:
+    program.restart()
+    compare(name, [program.ask(request) for request in EXCHANGES[name]().requests])
 
 
 @pytest.mark.parametrize("name", EXCHANGES)
-def test_the_cortex_m_answers_so(name: str, by_emulator: Callable[[list[Request]], list[Answer]]) -> None:
-    compare(name, by_emulator(EXCHANGES[name]().requests))
+def test_the_cortex_m_answers_so(name: str, by_emulator: dict[str, list[Answer]]) -> None:
+    compare(name, by_emulator[name])
 
 
 if __name__ == "__main__":
