@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import DriverError, FileError
 from ..files.whole import naming
 from ..waveform.file import read_waveform
 from ..waveform.manifest import Manifest
@@ -64,8 +64,11 @@ def _main() -> None:
     for name in ("record", "waveform", "out"):
         parser.add_argument(name, type=Path)
     given = parser.parse_args()
-    manifest, _ = read_waveform(given.waveform)
-    write_vectors(given.record, manifest, given.out)
+    try:
+        manifest, _ = read_waveform(given.waveform)
+        write_vectors(given.record, manifest, given.out)
+    except DriverError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -118,44 +118,72 @@ def test_the_static_check_is_clean() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def hostile(seed: int, packets: int) -> Iterator[bytes]:
-    """Noise, spoiled packets, and whole packets of a session whose numbers are out of all bounds."""
-    random_ = random.Random(seed)
-    number = 0
-    extremes = [0, 1, 2, 7, 40, 4096, 65535, 65536, 1 << 31, (1 << 32) - 1]
-    for _ in range(packets):
-        kind = random_.choice([*Kind, Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE])
-        shape = SHAPES[kind]
-        size = shape.fixed + shape.item * random_.choice([0, 1, 2, 3, 4, 9, 60]) if shape.item else shape.fixed
-        payload = bytearray(random_.randbytes(size))
+COMMON = (Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE, Kind.MARK)
+ITEMS = {Kind.COUPLING: (2,), Kind.TONES: (0, 1, 2), Kind.ENVELOPE: (1, 4), Kind.SAMPLES: (20, 200), Kind.KEY: (3,)}
+EXTREMES = [0, 1, 2, 7, 40, 4096, 65535, 65536, 1 << 31, (1 << 32) - 1]
+
+
+class Hostile:
+    """Whole packets of sessions that may be carried out, or ask for what is out of all bounds; and spoiled ones."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._number = self._total = self._first = self._at = 0
+        self._parametric = False
+
+    def packets(self, count: int) -> Iterator[bytes]:
+        """So many of them, some with noise in them."""
+        pick = self._random
+        for _ in range(count):
+            kind = pick.choice([*Kind, Kind.START, *COMMON * 9])
+            if kind is Kind.SAMPLES and self._parametric and pick.random() < 0.98:
+                continue
+            wire = encode(self._packet(kind))
+            if pick.random() < 0.02:
+                at = pick.randrange(len(wire))
+                wire = wire[:at] + pick.randbytes(pick.randrange(4)) + wire[at + 1 :]
+            yield wire
+
+    def _packet(self, kind: Kind) -> Packet:
+        pick, shape = self._random, SHAPES[kind]
+        items = pick.choice(ITEMS.get(kind, (0,)) if pick.random() < 0.95 else (0, 1, 2, 3, 4, 9, 60))
+        size = shape.fixed + shape.item * items
+        payload = bytearray(pick.randbytes(size))
         if kind is Kind.START:
-            session = random_.randrange(1, 1 << 32)
-            payload[:17] = struct.pack("<IBIQ", session, random_.randrange(4), RATE_HZ, random_.choice(extremes))
-            number = 0
+            self._total, self._number, self._first = pick.choice([0, 0, 40, *EXTREMES]), 0, 0
+            self._at, mode = 0, pick.choice([0, 0, 0, 1, 1, 1, 3, 255])
+            self._parametric = bool(mode & 1)
+            session = pick.randrange(1, 1 << 32)
+            payload[:17] = struct.pack("<IBIQ", session, mode, RATE_HZ, self._total)
         elif kind is Kind.SAMPLES:
-            payload[:10] = struct.pack("<QH", random_.choice(extremes[:4]), (size - 10) // 4)
+            count = (size - shape.fixed) // 4
+            payload[:10] = struct.pack("<QH", self._first if pick.random() < 0.98 else pick.choice(EXTREMES), count)
+            self._first += count
+        elif kind is Kind.END:
+            payload = bytearray(struct.pack("<Q", self._total if pick.random() < 0.9 else pick.choice(EXTREMES)))
         elif kind in ORDERED and size >= 14:
-            at, ramp = random_.choice(extremes[:6]), random_.choice(extremes)
-            payload[:14] = struct.pack("<QHI", at, random_.randrange(3), ramp)
-            for place in range(14, size - 3, 4):
-                if random_.random() < 0.7:
-                    payload[place : place + 4] = struct.pack("<f", random_.choice([0.0, 1.0, -50.0, 99.0, 1e30, 5e-40]))
-        wire = encode(Packet(kind, number + random_.choice([0, 0, 0, 0, 1, 5, 33]) if kind in ORDERED else 0, payload))
-        number += kind in ORDERED and random_.random() < 0.8
-        if random_.random() < 0.1:
-            at = random_.randrange(len(wire))
-            wire = wire[:at] + random_.randbytes(random_.randrange(4)) + wire[at + 1 :]
-        yield wire
+            self._at += pick.choice([0, 20, 60])
+            at, ramp = (self._at, pick.choice(EXTREMES[1:8])) if pick.random() < 0.95 else pick.sample(EXTREMES, 2)
+            if kind is Kind.ENVELOPE and items == 1:
+                ramp = 0
+            payload[:14] = struct.pack("<QHI", at, pick.randrange(2 if pick.random() < 0.99 else 1 << 16), ramp)
+            for place in range(14 if kind is not Kind.ENVELOPE else 22, size - 3, 4):
+                if kind is not Kind.COUPLING and pick.random() < 0.995:
+                    payload[place : place + 4] = struct.pack("<f", pick.choice([0.0, 1.0, -50.0, 40.0, 1e-3, 5e-40]))
+        if kind not in ORDERED:
+            return Packet(kind, 0, bytes(payload))
+        number, self._number = self._number, self._number + 1
+        return Packet(kind, number + (pick.choice([1, 5, 33]) if pick.random() < 0.01 else 0), bytes(payload))
 
 
 def survives(packets: int, seed: int) -> None:
     """Feed hostile packets to the watched program; in the end it greets, and plays a session like any other."""
     with GivenProgram(built("given", "trial", flags=SANITIZED), TRIAL) as program:
         now_us, pile, states = 0, bytearray(), set[State]()
-        for count, wire in enumerate(hostile(seed, packets)):
+        for count, wire in enumerate(Hostile(seed).packets(packets)):
             pile += wire
-            if count % 20 == 19:
-                now_us += 3000
+            if count % 10 == 9:
+                now_us += 20_000
                 answer = program.ask(Request(now_us, bytes(pile)))
                 assert (np.abs(answer.codes.astype(np.int64)) <= FULL).all()
                 words = " ".join(told(answer.sent)).split()

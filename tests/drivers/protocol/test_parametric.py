@@ -183,7 +183,7 @@ def play(port: str, path: Path, seconds: float) -> dict[str, object]:
 def test_an_emulated_cortex_m_plays_hello_world(device: str, hello: dict[str, Path], tmp_path: Path) -> None:
     need("qemu-system-arm")
     record = tmp_path / "record"
-    image = built("cortex-m", GRIDS[device].name, "-DDW_BUFFER_SAMPLES=0u -DDW_EVENT_SLOTS=2048u -DDW_MAX_PAYLOAD=512u")
+    image = built("cortex-m", GRIDS[device].name)
     config = f"enable=on,target=native,arg=dotwave,arg={record}"
     command = ["qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "pty"]
     with subprocess.Popen(
