@@ -50,14 +50,14 @@ static cubic of_points(int32_t p0, int32_t p1, int32_t p2, int32_t p3, uint64_t 
 {
     int64_t one = 3 * ((int64_t)p1 - p0), two = 3 * ((int64_t)p0 - 2 * (int64_t)p1 + p2);
     int64_t three = (int64_t)p3 - 3 * (int64_t)p2 + 3 * (int64_t)p1 - p0;
-    int64_t h1 = dw_part_of((int64_t)raised(one), share);
-    int64_t h2 = dw_part_of(dw_part_of((int64_t)raised(two), share), share);
-    int64_t h3 = dw_part_of(dw_part_of(dw_part_of((int64_t)raised(three), share), share), share);
+    uint64_t h1 = (uint64_t)dw_part_of((int64_t)raised(one), share);
+    uint64_t h2 = (uint64_t)dw_part_of(dw_part_of((int64_t)raised(two), share), share);
+    uint64_t h3 = (uint64_t)dw_part_of(dw_part_of(dw_part_of((int64_t)raised(three), share), share), share);
     cubic c;
     c.value = raised(p0);
-    c.first = (uint64_t)(h1 + h2 + h3);
-    c.second = (uint64_t)(2 * h2 + 6 * h3);
-    c.third = (uint64_t)(6 * h3);
+    c.first = h1 + h2 + h3;
+    c.second = 2u * h2 + 6u * h3;
+    c.third = 6u * h3;
     return c;
 }
 

@@ -100,7 +100,7 @@ def _piece(
 
 def _fitted(basis: Floats, volts: Floats, tol: float) -> Floats | None:
     """The nearest in the mean square, which misses in both directions alike: what is left of it is fast."""
-    found = None
+    found: Floats | None = None
     # What does not fit some of the samples does not fit all.
     for step in (max(1, len(volts) // FEW), 1):
         found = np.linalg.lstsq(basis[::step], volts[::step], rcond=RCOND)[0]
@@ -112,7 +112,7 @@ def _fitted(basis: Floats, volts: Floats, tol: float) -> Floats | None:
 def _waves(first: int, samples: int, carriers: tuple[int, ...]) -> Floats:
     """cos and -sin of every carrier, one column of ones where it stands still; float64, shape (S, columns)."""
     index = np.arange(first, first + samples).astype(np.uint64)
-    columns = []
+    columns: list[Floats] = []
     for turns in carriers:
         phase = (index * np.uint64(turns)).astype(np.float64) * (2 * np.pi / WHOLE_TURN)
         columns += [np.cos(phase), -np.sin(phase)] if turns else [np.ones(samples)]

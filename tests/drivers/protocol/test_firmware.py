@@ -85,6 +85,14 @@ def test_a_long_envelope_ends_where_it_is_to() -> None:
     assert np.abs(out[first : first + 65536] - wanted).max() <= 1e-3 * 100.0 / 2
 
 
+@pytest.mark.parametrize("ramp", [1, 2, 3])
+def test_the_steepest_pieces_overflow_nowhere(ramp: int) -> None:
+    for points in ((100, -100, 100, -100), (-100, 100, -100, 100), (100, 100, -100, -100)):
+        out = drawn(Envelope(0, 0, ramp, 0, tuple(complex(volts) for volts in points)), 40)
+        assert out[np.flatnonzero(out)[0]] == points[0]
+        assert out[np.flatnonzero(out)[0] + ramp] == points[-1]
+
+
 def sizes(grid: Grid, options: str) -> int:
     """Bytes of RAM that the core takes on a Cortex-M4."""
     core = built("core", grid.name, options).with_name(f"{grid.name}.o")
@@ -106,7 +114,7 @@ def test_what_a_vector_takes_of_time(grid: Grid, most: int) -> None:
     need("arm-none-eabi-gcc", "qemu-system-arm")
     image = built("count", grid.name, "-DDW_BUFFER_SAMPLES=0u")
     command = ["qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-serial", "none", "-monitor", "none"]
-    more = ["-icount", "shift=0", "-semihosting-config", "enable=on,target=native", "-kernel", image]
+    more = ["-icount", "shift=0", "-semihosting-config", "enable=on,target=native", "-kernel", str(image)]
     done = subprocess.run([*command, *more], capture_output=True, text=True, timeout=100, check=True)
     (count,) = re.findall(r"(\d+) instructions a vector", done.stdout + done.stderr)
     assert 100 < int(count) <= most

@@ -205,7 +205,7 @@ def test_an_emulated_cortex_m_plays_hello_world(device: str, hello: dict[str, Pa
 @pytest.mark.parametrize("drawn", [True, False])
 def test_the_program_on_a_terminal_plays_hello_world(drawn: bool, hello: dict[str, Path], tmp_path: Path) -> None:
     record = tmp_path / "record"
-    command = [built("posix", "paper_6x6"), "--record", record]
+    command = [str(built("posix", "paper_6x6")), "--record", str(record)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as controller:
         assert controller.stdout is not None
         port = controller.stdout.readline().strip()
