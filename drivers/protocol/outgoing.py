@@ -65,10 +65,10 @@ def check_fit(manifest: Manifest, found: Capabilities, *, parametric: bool = Fal
         With the first thing that differs.
     """
     lam_max = max((max(event.lam, default=0.0) for event in manifest.coupling), default=0.0)
-    check_fit_for(manifest.device, found, lam_max)
+    check_fit_for(manifest.device, found, lam_max, parametric=parametric)
 
 
-def check_fit_for(device: Device, found: Capabilities, lam_max: float) -> None:
+def check_fit_for(device: Device, found: Capabilities, lam_max: float, *, parametric: bool = False) -> None:
     """The same for any waveform of `device` whose links go up to `lam_max`."""
     if not 1 <= found.version <= VERSION:
         raise UnfitController(
