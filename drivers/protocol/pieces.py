@@ -100,13 +100,15 @@ def _piece(
 
 def _fitted(basis: Floats, volts: Floats, tol: float) -> Floats | None:
     """The nearest in the mean square, which misses in both directions alike: what is left of it is fast."""
-    found: Floats | None = None
     # What does not fit some of the samples does not fit all.
-    for step in (max(1, len(volts) // FEW), 1):
-        found = np.linalg.lstsq(basis[::step], volts[::step], rcond=RCOND)[0]
-        if np.abs(basis[::step] @ found - volts[::step]).max() > tol:
-            return None
-    return found
+    if len(volts) >= 2 * FEW and _nearest(basis[:: len(volts) // FEW], volts[:: len(volts) // FEW], tol) is None:
+        return None
+    return _nearest(basis, volts, tol)
+
+
+def _nearest(basis: Floats, volts: Floats, tol: float) -> Floats | None:
+    found = np.asarray(np.linalg.lstsq(basis, volts, rcond=RCOND)[0], dtype=np.float64)
+    return found if np.abs(basis @ found - volts).max() <= tol else None
 
 
 def _waves(first: int, samples: int, carriers: tuple[int, ...]) -> Floats:
