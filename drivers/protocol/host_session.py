@@ -294,7 +294,7 @@ class HostSession:
             self._lead_s = max(self._lead_s, min(2 * self._lead_s, MOST_LEAD_S))
         report.underruns, report.lost_s, report.bad_there = ack.underruns, ack.held_ms / 1000, ack.bad
         streaming = self._waiting is not None or self._window
-        if ack.state is State.PLAYING and ack.played and streaming and self.capabilities is not None:
+        if ack.state is State.PLAYING and ack.played and ack.received and streaming and self.capabilities is not None:
             stored = (ack.received - ack.played) / self.capabilities.rate_hz
             report.least_buffer_s = min(report.least_buffer_s, stored)
         if Flag.GAP in ack.flags:

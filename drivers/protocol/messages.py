@@ -26,7 +26,7 @@ __all__ = [
 
 Codes = NDArray[np.int16]
 
-VERSION = 4  # the newest spoken here; a controller and a host speak the newest that both know
+VERSION = 5  # the newest spoken here; a controller and a host speak the newest that both know
 PARAMETRIC, PREFILL = 1, 2  # bits of START's mode
 FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
 

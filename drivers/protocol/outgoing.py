@@ -27,7 +27,7 @@ from .replies import Capabilities
 
 __all__ = [
     "Coder", "End", "Message", "UnfitController", "block_of", "check_fit", "check_fit_for", "fitting", "link_coupling",
-    "session_messages",
+    "links_of", "marks_of", "session_messages",
 ]  # fmt: skip
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
@@ -56,8 +56,8 @@ class End:
 Message = StartMessage | Event | SamplesMessage | End
 
 
-def check_fit(manifest: Manifest, found: Capabilities) -> None:
-    """Compare what the waveform needs with what the controller is.
+def check_fit(manifest: Manifest, found: Capabilities, *, parametric: bool = False) -> None:
+    """Compare what the waveform needs with what the controller is; `parametric`: it needs no room for samples.
 
     Raises
     ------
@@ -65,10 +65,10 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
         With the first thing that differs.
     """
     lam_max = max((max(event.lam, default=0.0) for event in manifest.coupling), default=0.0)
-    check_fit_for(manifest.device, found, lam_max)
+    check_fit_for(manifest.device, found, lam_max, parametric=parametric)
 
 
-def check_fit_for(device: Device, found: Capabilities, lam_max: float) -> None:
+def check_fit_for(device: Device, found: Capabilities, lam_max: float, *, parametric: bool = False) -> None:
     """The same for any waveform of `device` whose links go up to `lam_max`."""
     if not 1 <= found.version <= VERSION:
         raise UnfitController(
@@ -93,6 +93,10 @@ def check_fit_for(device: Device, found: Capabilities, lam_max: float) -> None:
         )
     if lam_max > 0 and not (found.lam_step > 0 and lam_max <= found.lam_max * (1 + 1e-6)):
         raise UnfitController(f"controller {found.name!r}: its lam ends at {found.lam_max:g}, {lam_max:g} is needed")
+    if parametric:
+        return
+    if not found.buffer_samples:
+        raise UnfitController(f"controller {found.name!r}: it has no room for samples; play with --parametric")
     if SamplesMessage.most(found.channels, found.max_payload) < 1:
         raise UnfitController(f"controller {found.name!r}: one sample of {found.channels} channels fits no packet")
 
@@ -122,7 +126,7 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
         session, False, manifest.rate_hz, manifest.samples, fitting(scene_note(manifest), found, START_FIXED)
     )
     waiting = merge(
-        _links(manifest, found), _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at
+        links_of(manifest, found), marks_of(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )
     event = next(waiting, None)
     coder, first = Coder(manifest.channels, found.full_volts), 0
@@ -161,7 +165,8 @@ class Coder:
         return np.rint(codes).clip(-FULL_CODE, FULL_CODE).astype(np.int16)
 
 
-def _links(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+def links_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+    """What moves the links, by time."""
     # Events go by time; in the manifest they do so within each row only.
     for event in sorted(manifest.coupling, key=lambda event: event.t_s):
         yield link_coupling(event, found)
@@ -175,7 +180,8 @@ def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling:
     return LinkCoupling(at, event.row, ramp, tuple(min(65535, round(lam / step)) for lam in event.lam))
 
 
-def _marks(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+def marks_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+    """A mark for each frame."""
     for number, mark in enumerate(manifest.frames):
         yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, 12))
 

@@ -46,6 +46,7 @@ class Kind(IntEnum):
     SAMPLES = 0x15
     END = 0x16
     MEASURE = 0x17
+    ENVELOPE = 0x18
     CAPABILITIES = 0x81
     ACK = 0x82
     MARKED = 0x83
@@ -54,7 +55,7 @@ class Kind(IntEnum):
     KEY = 0x86
 
 
-ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.MEASURE)
+ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.ENVELOPE)
 
 
 class Shape(NamedTuple):
@@ -78,6 +79,7 @@ SHAPES = {
     Kind.SAMPLES: Shape(10, 2),
     Kind.END: Shape(8, 0),
     Kind.MEASURE: Shape(16, 8),
+    Kind.ENVELOPE: Shape(22, 8),
     Kind.CAPABILITIES: Shape(45, 1),
     Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),

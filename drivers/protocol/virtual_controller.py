@@ -12,6 +12,7 @@ from functools import partial
 from typing import Protocol
 
 from .early import EarlyPackets
+from .envelope import LONGEST_PIECE, Envelope
 from .keys import KeyEvent, KeyWaiting
 from .measured import Measure, parts_of
 from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
@@ -200,7 +201,7 @@ class VirtualController:
     def _start(self, start: StartMessage) -> None:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
-        self.playout.begin(start.parametric, start.prefill)
+        self.playout.begin(start.parametric, start.total, start.prefill)
         self._forget()
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
@@ -255,7 +256,11 @@ class VirtualController:
         if isinstance(event, LinkCoupling):
             fits = event.row < spec.rows and len(event.codes) == spec.cols - 1
             if not fits or max(event.codes, default=0) * spec.lam_step > spec.lam_max * (1 + 1e-6):
-                raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most {spec.lam_max}")
+                raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most lam_max")
+        elif isinstance(event, Envelope):
+            if event.channel >= spec.channels or not event.fits(spec.full_volts):
+                pieces = f"1 point or 4 over 1 to {LONGEST_PIECE} samples"
+                raise _Refusal(f"envelope: channels 0..{spec.channels - 1}, {pieces}, at most full_volts")
         elif isinstance(event, Measure):
             if self._meter is None or not event.samples or not 1 <= len(event.turns) <= spec.rows:
                 why = f"at least 1 sample and phases of 1 to {spec.rows} rows"
@@ -265,7 +270,7 @@ class VirtualController:
             rest = [] if isinstance(event, Bias) else [n for tone in event.tones for n in (tone.hz, tone.phase)]
             fits = event.channel < spec.channels and all(map(math.isfinite, (*volts, *rest)))
             if not fits or sum(map(abs, volts)) > spec.full_volts:
-                raise _Refusal(f"channels 0..{spec.channels - 1}, at most {spec.full_volts:g} V in all")
+                raise _Refusal(f"channels 0..{spec.channels - 1}, at most full_volts in all")
 
     def _end(self, total: int) -> None:
         announced = self._total or total
@@ -307,5 +312,6 @@ def _event(packet: Packet) -> Event:
         Kind.TONES: Tones,
         Kind.MARK: Mark,
         Kind.MEASURE: Measure,
+        Kind.ENVELOPE: Envelope,
     }
     return kinds[packet.kind].of(packet)

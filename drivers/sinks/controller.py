@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,8 +11,10 @@ from planner import Measured
 
 from ..formats.samples import SampleReader
 from ..protocol.host_session import HostSession, StreamReport, Timing
-from ..protocol.outgoing import session_messages
+from ..protocol.outgoing import Message, session_messages
+from ..protocol.parametric import ENVELOPES_SINCE, NotParametric, ParametricSession
 from ..protocol.playout import BUFFER_S
+from ..protocol.replies import Capabilities
 from ..waveform.manifest import Manifest
 from .base import SinkError, SinkReport
 from .serial_play import run_session
@@ -30,12 +32,14 @@ class Controller:
     port : such as /dev/ttyACM0.
     baud : bits per second, None: the controller's own.
     patience_s : how long to wait for a controller that is not heard.
+    parametric : send what the controller draws itself in place of samples, where waveform and controller allow it.
     on_measured : gets what the controller measured of each frame, where it does.
     """
 
     port: str
     baud: int | None = None
     patience_s: float = 10.0
+    parametric: bool = False
     on_measured: Callable[[Measured], None] | None = None
 
     def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
@@ -53,18 +57,17 @@ class Controller:
         if not self.port:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
+        way = _Way.of(manifest, samples) if self.parametric else _Way(manifest, samples)
         session = HostSession(
-            lambda found: session_messages(manifest, samples, found, session=number),
-            session=number, timing=Timing(), on_measured=self.on_measured,
-        )  # fmt: skip
+            lambda found: way.messages(found, number), session=number, timing=Timing(), on_measured=self.on_measured
+        )
         run_session(session, self._line, patience_s=self.patience_s, progress=progress)
         stream = session.report
-        rounding = f"off by at most {1e3 * manifest.device.amplifier.volts / 65534:.2f} mV"
         return SinkReport(
             ok=stream.underruns == 0 and stream.lost_s == 0,
             facts={"stream": _plain(stream)},
             lines=_lines(stream),
-            notes=(f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream)),
+            notes=way.notes(stream),
         )
 
     def close(self) -> None:
@@ -72,6 +75,40 @@ class Controller:
 
     def _line(self) -> Uart:
         return Uart(self.port) if self.baud is None else Uart(self.port, self.baud)
+
+
+@dataclass
+class _Way:
+    """How a waveform goes to a controller: as samples, or drawn by it; `why` it is not drawn though asked for."""
+
+    manifest: Manifest
+    samples: SampleReader
+    drawn: ParametricSession | None = None
+    why: str = ""
+
+    @classmethod
+    def of(cls, manifest: Manifest, samples: SampleReader) -> _Way:
+        """Drawn, if that can be."""
+        try:
+            return cls(manifest, samples, ParametricSession.of(manifest, samples))
+        except NotParametric as refusal:
+            return cls(manifest, samples, why=str(refusal))
+
+    def messages(self, found: Capabilities, session: int) -> Iterator[Message]:
+        """The session for the controller that answers."""
+        if self.drawn is not None and found.version < ENVELOPES_SINCE:
+            self.drawn, self.why = None, f"controller {found.name!r} knows no envelopes; update its firmware"
+        if self.drawn is not None:
+            return self.drawn.messages(found, session=session)
+        return session_messages(self.manifest, self.samples, found, session=session)
+
+    def notes(self, stream: StreamReport) -> tuple[str, ...]:
+        """What to know of it."""
+        if self.drawn is not None:
+            return (f"The controller drew it from {len(self.drawn.envelopes)} envelopes; no samples were sent.",)
+        rounding = f"off by at most {1e3 * self.manifest.device.amplifier.volts / 65534:.2f} mV"
+        streamed = (f"It was streamed: {self.why}.",) if self.why else ()
+        return (*streamed, f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream))
 
 
 def buffer_notes(stream: StreamReport) -> tuple[str, ...]:
