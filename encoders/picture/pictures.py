@@ -15,11 +15,12 @@ from ..braille.presentation import MIN_PART_S
 from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
 from .errors import EmptyPicture
 from .figure import Step, figure_steps, spaced_steps, style_of
-from .fit import Candidate, Window, best_patterns, choose_windows, plain_size, sampled
+from .fit import Candidate, Window, best_patterns, choose_window, plain_size, sampled
 from .limits import PictureLimits
-from .options import Fit, Output, PictureOptions, RegionsBy, Style
+from .options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
 from .regions import TEXTURES, TexturedRegion, dot_regions, textured
+from .sign import framed_sign
 from .similarity import POINTS, agreement, target_of
 from .steps import background_light, composite, content_box, luminance
 from .views import views
@@ -31,7 +32,7 @@ __all__ = ["PICTURES_VERSION", "FrameReport", "PictureReport", "PictureScene", "
 
 Floats = NDArray[np.float64]
 
-PICTURES_VERSION = 1
+PICTURES_VERSION = 2
 """One more whenever a picture gives other patterns: what was kept of icons before is not used."""
 
 PIXELS_PER_ACTUATOR = 12
@@ -199,24 +200,38 @@ def _frames(picture: Picture, shape: GridShape, options: PictureOptions) -> Iter
         high, wide = plain_size(plain[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
         pixels_per_m = (high * wide / (high_m * wide_m)) ** 0.5
         steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m)
-        yield replace(
-            _viewed(steps, "overview", _windows(steps, shape, options), shape, options), seconds=raster.seconds
-        )
+        made = _viewed(steps, "overview", _window(steps, shape, options), shape, options)
+        if options.crop and options.invert is Invert.AUTO:
+            made = _unframed(made, steps, shape, options)
+        yield replace(made, seconds=raster.seconds)
         parts = views(height, width, wide_m / high_m, options.zoom, options.overlap)[1:]
         if parts:
             steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m / options.zoom)
         for view in parts:
-            windows = [Window(view.top, view.bottom, view.left, view.right)]
-            yield replace(_viewed(steps, view.name, windows, shape, options), seconds=raster.seconds)
+            window = Window(view.top, view.bottom, view.left, view.right)
+            yield replace(_viewed(steps, view.name, window, shape, options), seconds=raster.seconds)
 
 
-def _windows(steps: list[Step], shape: GridShape, options: PictureOptions) -> list[Window]:
-    return choose_windows(steps[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+def _unframed(made: _Made, steps: list[Step], shape: GridShape, options: PictureOptions) -> _Made:
+    """The sign alone where the grid is too coarse to show anything of it inside its tile or ring."""
+    framed = framed_sign(steps[-1].image)
+    if framed is None:
+        return made
+    best = made.report.candidates[0]
+    inside = _dot_means(sampled(framed.inside.astype(np.float32), [best.window], shape)[0], shape) >= 0.5
+    if len(np.unique(best.dots[inside])) > 1:
+        return made
+    steps = [*steps, Step("sign without its frame", framed.sign)]
+    return _viewed(steps, "overview", _window(steps, shape, options), shape, options)
 
 
-def _viewed(steps: list[Step], view: str, windows: list[Window], shape: GridShape, options: PictureOptions) -> _Made:
+def _window(steps: list[Step], shape: GridShape, options: PictureOptions) -> Window:
+    return choose_window(steps[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+
+
+def _viewed(steps: list[Step], view: str, window: Window, shape: GridShape, options: PictureOptions) -> _Made:
     figure = steps[-1].image
-    fitted = best_patterns(figure, windows, shape, options.candidates)
+    fitted = best_patterns(figure, window, shape, options.candidates)
     best = fitted.candidates[0]
     similarity, regions = best.similarity, tuple[TexturedRegion, ...]()
     if options.output is Output.LEVELS:

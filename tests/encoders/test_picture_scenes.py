@@ -50,10 +50,10 @@ def test_a_scene_of_one_frame() -> None:
 
 
 def test_what_a_finger_should_find() -> None:
-    assert drawn(encode_picture(HEART, SIX)) == ["......", "######", "######", ".####.", "..##..", "......"]
-    pause = ["##..##"] * 6
+    assert drawn(encode_picture(HEART, SIX)) == [".#..#.", "######", "######", ".####.", "..##..", "......"]
+    pause = [".#..#."] * 6
     assert drawn(encode_picture(SAMPLES / "icons" / "pause.svg", SIX)) == pause
-    assert drawn(encode_picture(bars(0, 1, 4, 5), SIX)) == pause
+    assert drawn(encode_picture(bars(0, 1, 4, 5), SIX)) == ["##..##"] * 6
 
 
 @pytest.mark.parametrize("kind", ["PNG", "GIF", "BMP", "TIFF", "WEBP"])
@@ -101,7 +101,7 @@ def test_crop_and_fit() -> None:
     image.paste(bars(0, 1, 4, 5).convert("L"), (50, 30))
     assert drawn(encode_picture(image, SIX)) == ["##..##"] * 6
     assert drawn(encode_picture(image, SIX, PictureOptions(crop=False, style=Style.ICON))) != ["##..##"] * 6
-    wide = bars(0, 1, 4, 5).resize((320, 80))
+    wide = bars(0, 1, 4, 5).resize((480, 80))
     with pytest.raises(EmptyPicture):
         encode_picture(wide, SIX, PictureOptions(fit=Fit.COVER, style=Style.ICON, crop=False))
     middle = bars(3).resize((320, 80))
@@ -110,6 +110,21 @@ def test_crop_and_fit() -> None:
     )
     assert drawn(encode_picture(wide, SIX, PictureOptions(fit=Fit.STRETCH))) == ["##..##"] * 6
     assert drawn(encode_picture(wide, SIX, PictureOptions(fit=Fit.CONTAIN, style=Style.ICON)))[0] == "......"
+
+
+def test_a_tile_is_dropped_only_where_it_hides_its_sign() -> None:
+    """A plus cut out of a tile: wide arms are shown in the tile, thin ones by themselves."""
+    found = []
+    for width in (16, 2):
+        tile = Image.new("L", (96, 96), 255)
+        ImageDraw.Draw(tile).rectangle((6, 6, 89, 89), fill=0)
+        for box in ((48 - width / 2, 24, 47 + width / 2, 71), (24, 48 - width / 2, 71, 47 + width / 2)):
+            ImageDraw.Draw(tile).rectangle(box, fill=255)
+        found.append(drawn(encode_picture(tile, SIX)))
+    assert found[0][0] == "######"
+    assert "##..##" in found[0]
+    assert found[1][0] == "..##.."
+    assert found[1][2] == "######"
 
 
 def test_the_true_pitch_is_used() -> None:
