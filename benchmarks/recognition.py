@@ -29,7 +29,7 @@ from recognition_judges import JUDGES, Gallery  # noqa: E402
 from recognition_rivals import RIVALS  # noqa: E402
 from recognition_sets import REPORTED, TUNED, Drawn, drawn_icons  # noqa: E402
 
-from encoders import PICTURES_VERSION, Choice, GridShape, PictureOptions, choose_distinct, encode_picture  # noqa: E402
+from encoders import PICTURES_VERSION, Choice, GridShape, PictureOptions, choose_distinct, encode_picture, margins
 
 Bools = NDArray[np.bool_]
 
@@ -50,15 +50,14 @@ def ours(icons: Sequence[Drawn], shape: tuple[int, int]) -> Bools:
 def told_apart(icons: Sequence[Drawn], shape: tuple[int, int]) -> Bools:
     """Our patterns where the set is known beforehand."""
     options = PictureOptions(candidates=64)
-    found = [encode_picture(icon.data, GridShape(*shape), options).report.frames[0].candidates for icon in icons]
-    choices = [
-        Choice(
-            np.stack([one.dots.ravel() for one in some]).astype(np.uint8), np.array([one.similarity for one in some])
-        )
-        for some in found
-    ]
-    chosen = choose_distinct(choices)
-    return np.stack([some[index].dots for some, index in zip(found, chosen.tolist(), strict=True)])
+    frames = [encode_picture(icon.data, GridShape(*shape), options).report.frames[0] for icon in icons]
+    patterns = [np.stack([one.dots for one in frame.candidates]) for frame in frames]
+    similarity = [np.array([one.similarity for one in frame.candidates]) for frame in frames]
+    figures = np.stack([frame.figure for frame in frames])
+    worth = margins(figures, [some.astype(np.float64) for some in patterns], similarity)
+    codes = [some.reshape(len(some), -1).astype(np.uint8) for some in patterns]
+    chosen = choose_distinct([Choice(*pair) for pair in zip(codes, worth, strict=True)])
+    return np.stack([some[index] for some, index in zip(patterns, chosen.tolist(), strict=True)])
 
 
 def methods(icons: Sequence[Drawn], shape: tuple[int, int]) -> Iterator[tuple[str, Bools]]:

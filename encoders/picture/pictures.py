@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..braille.presentation import MIN_PART_S
 from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
+from .doubt import doubt_of
 from .errors import EmptyPicture
 from .figure import Step, figure_steps, spaced_steps, style_of
 from .fit import Candidate, Window, best_patterns, choose_window, plain_size, sampled
@@ -51,6 +52,7 @@ class FrameReport:
     similarity : of the frame's dots (or levels) with the figure, at most 1 (see `encoders.picture_similarity`).
     candidates : good on/off patterns of the figure, best first.
     regions : of a texture, else empty.
+    doubt : why its dots may not be known, in one sentence; empty where nothing speaks against them.
     figure : float64, shape (4 rows, 4 cols), read-only, 0..1: the figure as the best candidate's window cuts it out.
     """
 
@@ -60,6 +62,7 @@ class FrameReport:
     candidates: tuple[Candidate, ...]
     figure: Floats
     regions: tuple[TexturedRegion, ...] = ()
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -203,13 +206,21 @@ def _frames(picture: Picture, shape: GridShape, options: PictureOptions) -> Iter
         made = _viewed(steps, "overview", _window(steps, shape, options), shape, options)
         if options.crop and options.invert is Invert.AUTO:
             made = _unframed(made, steps, shape, options)
-        yield replace(made, seconds=raster.seconds)
+        yield replace(made, report=_doubted(made, picture.notes, options), seconds=raster.seconds)
         parts = views(height, width, wide_m / high_m, options.zoom, options.overlap)[1:]
         if parts:
             steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m / options.zoom)
         for view in parts:
             window = Window(view.top, view.bottom, view.left, view.right)
             yield replace(_viewed(steps, view.name, window, shape, options), seconds=raster.seconds)
+
+
+def _doubted(made: _Made, notes: tuple[str, ...], options: PictureOptions) -> FrameReport:
+    """The report of an overview, with what speaks against it."""
+    bright = next(step.image for step in made.steps if step.name == "luminance")
+    best = made.report.candidates[0]
+    doubt = doubt_of(bright, made.steps[-1].image, best.dots, best.similarity, notes, options.style is Style.ICON)
+    return replace(made.report, doubt=doubt)
 
 
 def _unframed(made: _Made, steps: list[Step], shape: GridShape, options: PictureOptions) -> _Made:
