@@ -29,7 +29,15 @@ from recognition_judges import JUDGES, Gallery  # noqa: E402
 from recognition_rivals import RIVALS  # noqa: E402
 from recognition_sets import REPORTED, TUNED, Drawn, drawn_icons  # noqa: E402
 
-from encoders import PICTURES_VERSION, Choice, GridShape, PictureOptions, choose_distinct, encode_picture, margins
+from encoders import (  # noqa: E402
+    PICTURES_VERSION,
+    Choice,
+    GridShape,
+    PictureOptions,
+    choose_distinct,
+    encode_picture,
+    margins,
+)
 
 Bools = NDArray[np.bool_]
 

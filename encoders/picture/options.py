@@ -172,7 +172,7 @@ class PictureOptions:
             self,
             style=style,
             crop=icon if self.crop is None else self.crop,
-            fit=self.fit or (Fit.CONTAIN if icon else Fit.COVER),
+            fit=self.fit or Fit.CONTAIN,
             contrast=not icon if self.contrast is None else self.contrast,
             threshold=self.threshold or Threshold.OTSU,
             gap_m=(0.0 if icon else PHOTO_GAP_M) if self.gap_m is None else self.gap_m,

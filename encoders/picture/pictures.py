@@ -20,7 +20,7 @@ from .fit import Candidate, Window, best_patterns, choose_window, plain_size, sa
 from .limits import PictureLimits
 from .options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
-from .regions import TEXTURES, TexturedRegion, dot_regions, textured
+from .regions import TEXTURES, TexturedRegion, dot_regions, legend, textured
 from .sign import framed_sign
 from .similarity import POINTS, agreement, target_of
 from .steps import background_light, composite, content_box, luminance
@@ -63,6 +63,11 @@ class FrameReport:
     figure: Floats
     regions: tuple[TexturedRegion, ...] = ()
     doubt: str = ""
+
+    @property
+    def legend(self) -> tuple[str, ...]:
+        """What each region of a texture is and feels like, in words."""
+        return legend(self.regions)
 
 
 @dataclass(frozen=True)
@@ -147,8 +152,20 @@ def encode_picture(
         for page, one in enumerate(made)
     )
     reports = tuple(one.report for one in made)
-    report = PictureReport(picture.name, picture.kind, picture.size, options.style, picture.notes, reports)
+    notes = (*picture.notes, *_cut(picture, reports[0].candidates[0].window, options))
+    report = PictureReport(picture.name, picture.kind, picture.size, options.style, notes, reports)
     return PictureScene(shape, frames, _encoding(picture, options), report=report)
+
+
+def _cut(picture: Picture, window: Window, options: PictureOptions) -> tuple[str, ...]:
+    """What `cover` leaves out, as a note."""
+    if options.fit is not Fit.COVER:
+        return ()
+    height, width = picture.frames[0].light.shape[:2]
+    down = max(0.0, min(window.bottom, height) - max(window.top, 0))
+    across = max(0.0, min(window.right, width) - max(window.left, 0))
+    percent = round(100 * (1 - down * across / (height * width)))
+    return (f"cover cuts {percent} % of the picture away, contain shows all of it",) if percent else ()
 
 
 def explain_picture(

@@ -198,7 +198,7 @@ def test_explain_shows_each_step_as_a_picture() -> None:
         == encode_picture(SAMPLES / "photos" / "ball.jpg", SIX).report.frames[0].steps
     )
     assert [step.name for step in steps] == [
-        "composite", "luminance", "local contrast", "threshold (otsu)", "invert", "fit (cover)", "on/off",
+        "composite", "luminance", "local contrast", "threshold (otsu)", "invert", "fit (contain)", "on/off",
     ]  # fmt: skip
     for step in steps:
         assert step.image.dtype == np.float32
@@ -234,3 +234,24 @@ def test_samples_are_small_and_written_by_their_script(tmp_path: Path) -> None:
     files = [*(SAMPLES / "textures").iterdir(), *(SAMPLES / "photos").iterdir()]
     assert len(files) == 5
     assert all(file.stat().st_size < 100_000 for file in files)
+
+
+def test_a_photograph_is_shown_whole_and_what_is_cut_is_said() -> None:
+    wide = GridShape(10, 24)
+    path = SAMPLES / "photos" / "lighthouse.jpg"
+    whole, cut = (encode_picture(path, wide, PictureOptions(fit=fit)).report for fit in (None, Fit.COVER))
+    height, width = whole.size
+    window = cut.frames[0].candidates[0].window
+    share = (window.bottom - window.top) * (window.right - window.left) / (height * width)
+    assert whole.notes == ()
+    (note,) = cut.notes
+    assert note.startswith(f"cover cuts {round(100 * (1 - share))} % of the picture away")
+
+
+def test_a_texture_has_a_legend_in_words() -> None:
+    scene = encode_picture(SAMPLES / "textures" / "fields.png", SIX, PictureOptions(output=Output.TEXTURE))
+    report = scene.report.frames[0]
+    assert len(report.legend) == len(report.regions)
+    assert any(line.endswith(": all together") for line in report.legend)
+    assert sum(int(line.split(" ")[0]) for line in report.legend) == pytest.approx(100, abs=2)
+    assert encode_picture(HEART, SIX).report.frames[0].legend == ()

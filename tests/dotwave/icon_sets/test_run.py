@@ -169,7 +169,9 @@ def test_what_may_not_be_known_is_said(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     folder.mkdir()
     for name, shape in shapes.items():
-        (folder / f"{name}.svg").write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{shape}</svg>', encoding="utf-8")
+        (folder / f"{name}.svg").write_text(
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-2 -2 80 40">{shape}</svg>', encoding="utf-8"
+        )
     report = render_icons([str(folder)], tmp_path / "out", ONE)
     said = {Path(icon.name).stem: icon.doubt for icon in report.icons}
     assert said["plain"] == ""
