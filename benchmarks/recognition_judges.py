@@ -91,7 +91,7 @@ def _unit(pictures: Floats) -> NDArray[np.float32]:
     """Each picture less its mean, of length 1; float32, shape (N, points)."""
     flat = pictures.reshape(len(pictures), -1)
     flat = flat - flat.mean(axis=1, keepdims=True)
-    return (flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)).astype(np.float32)
+    return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9), np.float32)
 
 
 def _drawing(points: int, dots: int) -> Floats:
