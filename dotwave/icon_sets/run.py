@@ -245,7 +245,11 @@ class IconRun:
         for name in sorted(self.keys):
             record = self.journal.find(self.keys[name])
             if record is not None and "bad" not in record:
-                yield replace(self._icon(name, record), same_as=same.get(name, ""), **self.told.get(name, {}))
+                told = self.told.get(name, {})
+                yield replace(
+                    self._icon(name, record), same_as=same.get(name, ""), label=told.get("label", ""),
+                    code_point=told.get("code_point", ""), category=told.get("category", ""),
+                )  # fmt: skip
 
     def _icon(self, name: str, record: Record) -> Icon:
         best = best_pattern(record, self.recipe.shape)
