@@ -62,12 +62,12 @@ def _is_word(figure: Floats) -> bool:
 
 
 def _is_line(dots: Bools) -> bool:
-    """Whether all that is raised is one run in one row or in one column."""
+    """Whether all that is raised is one bar, at least three times as long as it is wide; on the middle it is two dots."""
     places = np.argwhere(dots)
     if len(places) < 2:
         return False
     height, width = np.ptp(places, axis=0) + 1
-    return bool(min(height, width) == 1 and len(places) == max(height, width))
+    return bool(max(height, width) >= 3 * min(height, width) and len(places) == height * width)
 
 
 def _is_full(dots: Bools) -> bool:
