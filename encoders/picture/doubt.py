@@ -62,7 +62,7 @@ def _is_word(figure: Floats) -> bool:
 
 
 def _is_line(dots: Bools) -> bool:
-    """Whether all that is raised is one bar, at least three times as long as it is wide; on the middle it is two dots."""
+    """Whether all that is raised is one bar, at least three times as long as wide."""
     places = np.argwhere(dots)
     if len(places) < 2:
         return False
