@@ -106,6 +106,7 @@ from .picture.figure import (
     Step as Step,
 )
 from .picture.limits import PictureLimits as PictureLimits
+from .picture.margins import margins as margins
 from .picture.options import (
     Fit as Fit,
     Invert as Invert,
