@@ -13,6 +13,7 @@ import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -136,8 +137,8 @@ class Shown:
         frames = self.plan.frames if adaptation is None else adaptation.adapted(self.plan).frames
         limits = GateLimits.of(device, len(manifest.channels))
         session = HostSession(
-            lambda found: plan_messages(manifest, frames, found, session=7, limits=limits), session=7,
-            timing=Timing(lead_s=LEAD_S), on_measured=None if adaptation is None else adaptation.learned,
+            lambda found: plan_messages(manifest, frames, found, session=7, prefill_s=LEAD_S / 2, limits=limits),
+            session=7, timing=Timing(lead_s=LEAD_S), on_measured=None if adaptation is None else adaptation.learned,
         )  # fmt: skip
         session.connected()
         now = 0.0
@@ -189,7 +190,9 @@ def judged(shown: Shown, felt: dict[int, Measured]) -> tuple[list[bool], list[fl
 
 def _wave(frame: FramePlan, seen: Measured, device: Device) -> Complexes:
     """Deviations of a wave whose rows may be shifted alike, of full scale."""
-    wanted = np.concatenate([s.target * np.exp(1j * np.nan_to_num(s.phase)) for s in frame.states])
+    wanted = np.concatenate(
+        [s.target * np.exp(1j * np.nan_to_num(0.0 if s.phase is None else s.phase)) for s in frame.states]
+    )
     real = seen.harmonic / device.full_scale
     turn = np.exp(1j * np.angle(np.vdot(wanted, real)))
     return np.asarray(real - wanted * turn)
@@ -313,7 +316,7 @@ def main() -> None:
     given = parser.parse_args()
     kept = json.loads(given.out.read_text(encoding="utf-8")) if given.out.exists() else {}
     for name in given.only.split(","):
-        kept[name] = RUNS[name](given.plants, lambda said, name=name: print(name, said, flush=True))
+        kept[name] = RUNS[name](given.plants, partial(print, name, flush=True))
         given.out.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(table(kept))
 

@@ -41,3 +41,6 @@ from .errors import (
     AppError as AppError,
     NotMade as NotMade,
 )
+from .live.live import (
+    Live as Live,
+)

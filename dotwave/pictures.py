@@ -23,7 +23,9 @@ def picture_scene(source: Path | bytes, shape: GridShape, options: PictureOption
 
 
 def _picture_words(report: PictureReport) -> str:
-    """File, style, similarity, and what was left out."""
+    """File, style, similarity, what was left out, what textures mean, and what speaks against it."""
     frames = f", {len(report.frames)} frames" if len(report.frames) > 1 else ""
+    first = report.frames[0]
+    said = "".join(f"; {clause}" for clause in (*first.legend, first.doubt.rstrip(".")) if clause)
     notes = f" ({'; '.join(report.notes)})" if report.notes else ""
-    return f"{report.style}: {Path(report.name).name}{frames}, similarity {report.similarity:.2f}{notes}"
+    return f"{report.style}: {Path(report.name).name}{frames}, similarity {report.similarity:.2f}{notes}{said}"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import html
 import re
+from typing import Any, Protocol
 
-__all__ = ["HIDDEN", "csv_cell", "html_words", "one_line", "printable"]
+__all__ = ["HIDDEN", "Printable", "csv_cell", "html_words", "one_line", "printable"]
 
 # Control characters, which could write over a terminal; line separators; marks that turn the direction of what
 # follows, so that a name shows as another one; halves of surrogate pairs (bytes of file names that are not UTF-8).
@@ -20,6 +21,18 @@ _HIDDEN = re.compile(f"[{HIDDEN}]")
 _HIDDEN_OR_BREAK = re.compile(f"[{HIDDEN}\t\n]")
 # What a spreadsheet takes for a formula; an apostrophe too, so that taking one off gives the words back.
 _FORMULA = ("=", "+", "-", "@", "'")
+
+
+class Printable(Protocol):
+    """What every report can be shown as."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types."""
+        ...
+
+    def as_text(self) -> str:
+        """Lines of plain text."""
+        ...
 
 
 def printable(words: str) -> str:

@@ -240,7 +240,7 @@ def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
         together = list(parts)
         cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
         mark = marks[number]
-        pages.append(FeltPage(cells, mark.text, mark.goes_on, emphases_within(emphases, *mark.span)))
+        pages.append(FeltPage(cells, mark.text, mark.goes_on, emphases_within(emphases, *mark.span), mark.number))
         checks += [replace(check, felt_cells=cells) for check in together]
     shown = [(mark.span, mark.text) for mark in manifest.frames]
     source = covered_text(shown)

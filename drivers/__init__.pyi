@@ -48,6 +48,14 @@ from .formats.wav import (
 from .formats.wav_reader import (
     WavReader as WavReader,
 )
+from .live.loop_line import (
+    LoopLine as LoopLine,
+)
+from .live.messages import (
+    LiveEnded as LiveEnded,
+    LiveMessages as LiveMessages,
+    LiveSource as LiveSource,
+)
 from .protocol.emulator import (
     Emulator as Emulator,
     EmulatorStatus as EmulatorStatus,
@@ -66,6 +74,10 @@ from .protocol.host_session import (
     SessionLost as SessionLost,
     StreamReport as StreamReport,
     Timing as Timing,
+)
+from .protocol.keys import (
+    GridKey as GridKey,
+    KeyEvent as KeyEvent,
 )
 from .protocol.outgoing import (
     UnfitController as UnfitController,
@@ -90,6 +102,7 @@ from .protocol.playout import (
 )
 from .protocol.pty_line import (
     PtyUnavailable as PtyUnavailable,
+    make_link as make_link,
 )
 from .protocol.record import (
     ArrivalRecorder as ArrivalRecorder,
@@ -134,6 +147,7 @@ from .sinks.opening import (
 )
 from .sinks.serial_play import (
     NoAnswer as NoAnswer,
+    SerialLine as SerialLine,
     run_session as run_session,
 )
 from .sinks.tactile_board import (

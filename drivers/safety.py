@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -15,9 +16,10 @@ from chainsim import Device
 from .channels import Channel
 from .errors import DriverError
 from .formats.samples import SampleReader
+from .waveform.coupling import CouplingEvent
 from .waveform.manifest import Manifest
 
-__all__ = ["Gate", "GateLimits", "GateRefusal", "GateReport", "pass_gate"]
+__all__ = ["Gate", "GateLimits", "GateRefusal", "GateReport", "check_links", "pass_gate"]
 
 Floats = NDArray[np.float64]
 
@@ -153,6 +155,25 @@ class Gate:
             self._check_part(block[:room])
             block = block[room:]
 
+    def trial(self) -> Gate:
+        """A gate that goes on from here, for what may come; this one stays as it is."""
+        other = copy(self)
+        other._sums, other._largest = self._sums.copy(), dict(self._largest)
+        return other
+
+    def stay(self, count: int) -> None:
+        """Check that the last sample comes `count` times more; raises as `check`, at no cost for many."""
+        level = np.abs(self._last)
+        high = level > self._limits.duty_level * self._limits.volts
+        each = np.stack([self._last, high.astype(np.float64), np.zeros_like(self._last)])
+        while count > 0:
+            some = min(count, self._part - self._done % self._part)
+            self._sums += some * each
+            self._done += some
+            count -= some
+            if self._done % self._part == 0:
+                self._end_part()
+
     def finish(self) -> GateReport:
         """Check the step to 0 V after the last sample and the last windows.
 
@@ -214,6 +235,24 @@ class Gate:
         )  # fmt: skip
 
 
+def check_links(events: Iterable[CouplingEvent], limits: GateLimits, *, refused: str = REFUSED) -> None:
+    """Hold links against their limit; `refused` is how a refusal begins.
+
+    Raises
+    ------
+    GateRefusal
+        At the first that is over it.
+    """
+    for event in events:
+        worst = max(event.lam, key=abs, default=0.0)
+        if not 0 <= worst <= limits.lam_max * (1 + ROUND_OFF):
+            raise GateRefusal(
+                f"{refused}: lam of row {event.row} is {worst:.4g} at {event.t_s:.6g} s; "
+                f"the limit is {limits.lam_max:.4g}; plan for the device that is connected",
+                quantity="lam", channel=event.row, time_s=event.t_s, value=worst, limit=limits.lam_max,
+            )  # fmt: skip
+
+
 CURES = {
     "volts": "lower full_scale or lengthen the ramps",
     "slew": "lengthen the ramps",
@@ -240,14 +279,7 @@ def pass_gate(
         When the samples cannot be read or are not those the manifest was written for.
     """
     manifest.check_digest(Path(reader.path))
-    for event in manifest.coupling:
-        worst = max(event.lam, key=abs, default=0.0)
-        if not 0 <= worst <= limits.lam_max * (1 + ROUND_OFF):
-            raise GateRefusal(
-                f"{REFUSED}: lam of row {event.row} is {worst:.4g} at {event.t_s:.6g} s; "
-                f"the limit is {limits.lam_max:.4g}; plan for the device that is connected",
-                quantity="lam", channel=event.row, time_s=event.t_s, value=worst, limit=limits.lam_max,
-            )  # fmt: skip
+    check_links(manifest.coupling, limits)
     gate = Gate(limits, manifest.channels, manifest.rate_hz)
     done = 0
     for block in reader.blocks(BLOCK):

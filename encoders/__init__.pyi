@@ -5,6 +5,10 @@ from .braille.back_check import (
     back_check as back_check,
     back_translate as back_translate,
 )
+from .braille.cell_grid import (
+    CellGrid as CellGrid,
+    are_cells as are_cells,
+)
 from .braille.dots import (
     bits_to_cell as bits_to_cell,
     cell_to_bits as cell_to_bits,
@@ -52,7 +56,6 @@ from .braille.tables import (
 )
 from .braille.text import (
     TextFrames as TextFrames,
-    TextOptions as TextOptions,
     TextScene as TextScene,
     encode_text as encode_text,
 )
@@ -64,8 +67,11 @@ from .choices import (
     EmphasisChoice as EmphasisChoice,
     Grade as Grade,
     ImageChoice as ImageChoice,
+    LineEnds as LineEnds,
     Mathematics as Mathematics,
+    PageNumbering as PageNumbering,
     Presentation as Presentation,
+    TextOptions as TextOptions,
     Undefined as Undefined,
 )
 from .documents.flat import (
@@ -100,6 +106,7 @@ from .picture.figure import (
     Step as Step,
 )
 from .picture.limits import PictureLimits as PictureLimits
+from .picture.margins import margins as margins
 from .picture.options import (
     Fit as Fit,
     Invert as Invert,
@@ -126,6 +133,7 @@ from .scene import (
     GoesOn as GoesOn,
     GridShape as GridShape,
     Heading as Heading,
+    PageNumber as PageNumber,
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,

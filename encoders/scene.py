@@ -11,7 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Frame", "GoesOn", "GridShape", "Heading", "PatternKind", "Scene", "TargetPattern", "WalkingBars"]
+__all__ = [
+    "Frame",
+    "GoesOn",
+    "GridShape",
+    "Heading",
+    "PageNumber",
+    "PatternKind",
+    "Scene",
+    "TargetPattern",
+    "WalkingBars",
+]
 
 
 @dataclass(frozen=True)
@@ -87,6 +97,20 @@ class GoesOn:
 
 
 @dataclass(frozen=True, slots=True)
+class PageNumber:
+    """The number of a page where it is shown among its cells: these are not of the text.
+
+    Attributes
+    ----------
+    at : place of the first of its cells on the page, lines run together, from 0.
+    cells : as they stand there.
+    """
+
+    at: int
+    cells: str
+
+
+@dataclass(frozen=True, slots=True)
 class Heading:
     """A heading of what is shown, to jump to.
 
@@ -113,6 +137,7 @@ class Frame:
     cells : the page's cells as Unicode Braille, lines separated by a newline; empty when blank.
     goes_on : where words go on after a run of the page.
     headings : of the source, that begin on the page; of its parts the first has them.
+    number : which of the cells show the page's number; None where none do.
     """
 
     pattern: TargetPattern
@@ -123,6 +148,7 @@ class Frame:
     cells: str = ""
     goes_on: tuple[GoesOn, ...] = ()
     headings: tuple[Heading, ...] = ()
+    number: PageNumber | None = None
 
 
 @dataclass(frozen=True, repr=False)

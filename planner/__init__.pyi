@@ -20,6 +20,7 @@ from .analysis.requirement import (
     Term as Term,
     require as require,
 )
+from .analysis.standing import standing_error as standing_error
 from .analysis.tradeoff import (
     Tradeoff as Tradeoff,
     TradeoffChoice as TradeoffChoice,
@@ -69,6 +70,7 @@ from .identification.page_choice import (
 from .identification.stages import (
     SensorNoise as SensorNoise,
 )
+from .live_plan import LivePlan as LivePlan, LiveWay as LiveWay
 from .operating_point import (
     Margins as Margins,
     OperatingPoint as OperatingPoint,

@@ -14,7 +14,7 @@ from .operating_point import OperatingPoint
 from .plan import Ramp
 from .targets import AmplitudeTarget, ChainTarget
 
-__all__ = ["Change", "change_to"]
+__all__ = ["Change", "change_to", "moves_between"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget
     if any(state.outcome is not Outcome.OK for state in states):
         # What cannot be held is not played: no ways are looked for.
         return Change(after, tuple(states), (None,) * len(states))
-    moves = _moves(memory, before, after)
+    moves = moves_between(memory, before, after)
     # Where lam is common, all waves begin to rise together.
     common = device.coupling.scope == "device" and any(map(_wave, after))
     wait_s = memory.leaving_s(before, moves) if common and before != after else 0.0
@@ -53,7 +53,7 @@ def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget
     return Change(after, tuple(states), tuple(ramps))
 
 
-def _moves(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> bool:
+def moves_between(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> bool:
     """Whether lam may differ on the way from what it is at the ends: one lam for all only if all go one way."""
     scope = memory.device.coupling.scope
     if scope != "device":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from chainsim import Device
 from encoders import Frame
 
 from .frame_change import Change, change_to
@@ -15,7 +16,7 @@ from .wish import FrameWish
 if TYPE_CHECKING:
     from .outlook import MeansTried
 
-__all__ = ["Means"]
+__all__ = ["Means", "plain_means"]
 
 
 @dataclass(frozen=True)
@@ -47,3 +48,12 @@ class Means:
             return change
         wished = replace(dots, loudest=AS_WISHED)
         return change_to(self.memory, before, self.memory.hold(frame.pattern, before, wished))
+
+
+def plain_means(device: Device, contrast_db: float) -> Means:
+    """What a device without a choice of means is planned with."""
+    if device.actuators:
+        from .unequal import memory_of
+
+        return Means(memory_of(device, contrast_db))
+    return Means(Memory(device, contrast_db))

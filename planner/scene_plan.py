@@ -13,7 +13,7 @@ from encoders import Frame, Scene
 
 from .errors import ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
 from .frame_change import Change, change_to
-from .means import Means
+from .means import Means, plain_means
 from .memory import Memory
 from .operating_point import OperatingPoint
 from .plan import AMPLITUDE_ERROR_LIMIT, FramePlan, Plan
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .following import Following
     from .robustness.expected import Expectation
 
-__all__ = ["DEFAULT_CONTRAST_DB", "kept_share", "plan_scene"]
+__all__ = ["DEFAULT_CONTRAST_DB", "judged", "kept_share", "plan_scene"]
 
 DEFAULT_CONTRAST_DB = 20.0
 
@@ -102,11 +102,7 @@ class _Frames:
             from .robustness.means_search import means_for
 
             found = means_for(self._scene.frames, self._expected, self._planned_db, self._asked_db)
-        if found is None and self._device.actuators:
-            from .unequal import memory_of
-
-            return Means(memory_of(self._device, self._planned_db))
-        return found or Means(Memory(self._device, self._planned_db))
+        return found or plain_means(self._device, self._planned_db)
 
     def __iter__(self) -> Iterator[FramePlan]:
         means, memory = self.means, self.means.memory
@@ -141,8 +137,9 @@ class _Frames:
         times = start_s, start_s + longest, end_s
         # After the way out nothing is to be felt any more.
         residue = 0.0 if frame is None else self._left(change, start_s, longest, end_s - start_s)
-        whole = self._judged(
-            FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue)
+        whole = judged(
+            FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue),
+            self.means.memory,
         )
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
@@ -161,26 +158,30 @@ class _Frames:
         moments = (self._device.tau_per_s * at_s for at_s in (start_s, settled_s, length_s - settled_s))
         return self._following.through(change.states, change.ramps, *moments)
 
-    def _judged(self, plan: FramePlan) -> FramePlan:
-        for state in plan.states:
-            if state.outcome is not Outcome.OK:
-                return replace(plan, outcome=state.outcome, note=self._note(state))
-        for ramp in plan.ramps:
-            if ramp is not None and ramp.lacking:
-                note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
-                return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-        if plan.residue > AMPLITUDE_ERROR_LIMIT:
-            note = (
-                f"{self._device.name} cannot change to this pattern: what changes leave rings on at "
-                f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
-                "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
-            )
-            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-        return plan
 
-    def _note(self, state: OperatingPoint) -> str:
-        if state.outcome is not Outcome.UNREACHABLE:
-            return state.outcome.sentence
-        if state.lacking:
-            return f"{self._device.name} cannot make this pattern: {state.lacking}."
-        return self.means.memory.planner.family(AmplitudeTarget).note()
+def judged(plan: FramePlan, memory: Memory) -> FramePlan:
+    """A frame with its outcome, and a sentence where that is not ok."""
+    name = memory.device.name
+    for state in plan.states:
+        if state.outcome is not Outcome.OK:
+            return replace(plan, outcome=state.outcome, note=_note(state, memory))
+    for ramp in plan.ramps:
+        if ramp is not None and ramp.lacking:
+            note = f"{name} cannot change to this pattern: {ramp.lacking}."
+            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
+    if plan.residue > AMPLITUDE_ERROR_LIMIT:
+        note = (
+            f"{name} cannot change to this pattern: what changes leave rings on at "
+            f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
+            "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+        )
+        return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
+    return plan
+
+
+def _note(state: OperatingPoint, memory: Memory) -> str:
+    if state.outcome is not Outcome.UNREACHABLE:
+        return state.outcome.sentence
+    if state.lacking:
+        return f"{memory.device.name} cannot make this pattern: {state.lacking}."
+    return memory.planner.family(AmplitudeTarget).note()

@@ -11,8 +11,9 @@ from ..model.device import Device
 from ..model.surroundings import HigherMode, Surroundings
 from ..threads import in_threads
 from ..time_domain.as_built import AsBuilt
-from ..time_domain.integrate import LONGEST_STEP, limit_of
+from ..time_domain.integrate import limit_of
 from .acting import creep_of, plays_of
+from .composition import DISTINCT, LONGEST_STEP
 from .kernel import ChainSamples, Shared, advance_drawn, flows_of_step
 from .lanes import BETA_RUN, CREEPS, FLOWS_AT, GAIN_RUN, MODES, MOVES_RUN, RUNS, WIDTH
 
@@ -23,6 +24,8 @@ Whole = NDArray[np.int64]
 
 # A factor that a draw would take below this counts as this, so that no number changes its sign.
 _LEAST = 0.01
+# Creep takes a step at least so often: in tau, and in units of its first time.
+_CREEP_STEP, _CREEP_SHARE = 0.25, 0.002
 
 
 class DrawnDevices:
@@ -34,7 +37,7 @@ class DrawnDevices:
     Parameters
     ----------
     device : the profile; actuators that were measured are drawn around what they were measured to be.
-    around : what acts on it; `bandwidth_hz`, `converter_bits` and `row_lam` are not looked at.
+    around : what acts on it; `bandwidth_hz` and `converter_bits` are not looked at.
     first, count : number of the first device, and how many.
     seed : of the draws and of the noise.
     rate_hz : samples a second.
@@ -93,22 +96,25 @@ class DrawnDevices:
         forces = np.concatenate([before[0][:, None], forces[:, skip:]], axis=1)
         links = np.concatenate([before[1][:, None], links[:, skip:]], axis=1)
         self._last = forces[:, -1].copy(), links[:, -1].copy()
-        per_row, first = self._device.chains_per_row, self._done + skip
+        first, basis = self._done + skip, np.repeat(basis[:, skip:], self._device.chains_per_row, axis=0)
         place = np.arange(self._chains * self._n).reshape(self._chains, self._n)
+        # Chains that know nothing of each other are moved one by one.
+        together = self._chains if self._shared.row_lam else 1
 
         def work(part: slice) -> None:
             for unit in range(part.start, part.stop):
-                block, chain = divmod(unit, self._chains)
+                block, number = divmod(unit, self._chains // together)
+                chains = slice(number * together, (number + 1) * together)
                 given = ChainSamples(
-                    forces[chain], links[chain], self._noise[chain], place[chain], place.size, first, frame[skip:],
-                    basis[chain // per_row, skip:],
+                    forces[chains], links[chains], self._noise[chains], place[chains], place.size, first, frame[skip:],
+                    basis[chains],
                 )  # fmt: skip
                 advance_drawn(
-                    self._work[block, chain], self._seeds[block], given, self._shared, self._load[block, chain],
-                    self._escaped[block, chain],
+                    self._work[block, chains], self._seeds[block], given, self._shared, self._load[block, chains],
+                    self._escaped[block, chains],
                 )  # fmt: skip
 
-        in_threads(work, len(self._work) * self._chains, 1)
+        in_threads(work, len(self._work) * self._chains // together, 1)
         self._done += len(force)
 
     def _by_chain(self, values: Floats) -> Floats:
@@ -127,7 +133,7 @@ class DrawnDevices:
         actuators[..., GAIN_RUN, :], actuators[..., BETA_RUN, :] = laid(drawn.lam_gain), laid(drawn.beta)
         actuators[..., MOVES_RUN, :] = 1.0
         flows = flows_of_step(drawn.delta.ravel(), drawn.stiffness.ravel(), step)
-        for run, values in enumerate(flows.reshape(12, *drawn.delta.shape)):
+        for run, values in enumerate(flows.reshape(3 * DISTINCT, *drawn.delta.shape)):
             actuators[..., FLOWS_AT // WIDTH + run, :] = laid(values)
         return work.reshape(blocks, self._chains, -1)
 
@@ -160,11 +166,12 @@ def _shared(device: Device, around: Surroundings, dtau: float, substeps: int, li
     delta, square = np.array([[mode.delta, mode.omega**2] for mode in modes]).T
     flows = flows_of_step(np.ascontiguousarray(delta), np.ascontiguousarray(square), dtau / substeps)
     times = np.full(CREEPS, np.inf) if creep is None else np.array(creep.times)
+    every = 0 if creep is None else max(1, int(min(_CREEP_STEP, _CREEP_SHARE * creep.times[0]) / dtau))
     piezo = np.concatenate([[play.base + sum(play.weight)], play.radius, play.weight, [mode.gain for mode in modes]])
     return Shared(
-        dtau, substeps, limit, device.chain.law.closed, around.preload, piezo,
-        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight) or creep is not None,
-        -np.expm1(-dtau / times), 0.0 if creep is None else creep.per_decade / creep.each,
+        dtau, substeps, limit, device.chain.law.closed, around.row_lam, device.chains_per_row, around.preload, piezo,
+        np.ascontiguousarray(np.moveaxis(flows, -1, 0)), any(play.weight), every,
+        -np.expm1(-dtau * every / times), 0.0 if creep is None else creep.per_decade / creep.each,
     )  # fmt: skip
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..inlined import inlined
+from .composition import DISTINCT
 
 __all__ = [
     "BETA_RUN", "CREEPS", "FLOWS_AT", "GAIN_RUN", "MODES", "MOVES_RUN", "PLAYS", "RUNS", "TIP_RUN", "WIDTH", "add",
-    "arrive", "copy", "creep", "flow_all", "hiss", "kick_all", "push_all",
+    "arrive", "copy", "creep", "flow_all", "hiss", "kick_all", "pull_all", "push_all",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -32,11 +33,12 @@ _Q, _P, _TIP, _GAIN, _BETA, _CREPT, _NOISE, _HISS, _MOVES = (run * WIDTH for run
 _MODE = 9 * WIDTH  # Position and velocity of each.
 _PLAY = _MODE + 2 * MODES * WIDTH
 _CREEP = _PLAY + PLAYS * WIDTH
+_PULL = _CREEP + CREEPS * WIDTH
 
-FLOWS_AT = _CREEP + CREEPS * WIDTH
-"""Where the four distinct flows of the oscillator begin, three coefficients each."""
+FLOWS_AT = _PULL + WIDTH
+"""Where the distinct flows of the oscillator begin, three coefficients each."""
 
-RUNS = FLOWS_AT // WIDTH + 12
+RUNS = FLOWS_AT // WIDTH + 3 * DISTINCT
 
 _GOLDEN, _FIRST_MIX, _SECOND_MIX = (
     np.uint64(word) for word in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
@@ -75,7 +77,7 @@ def kick_all(
     c1, s1, d1, c2, s2, d2 = first[0], first[1], first[2], second[0], second[1], second[2]
     for w in range(WIDTH):
         moves = row[_MOVES + w]
-        e = moves * (force + row[_NOISE + w] + at * row[_HISS + w])
+        e = moves * (force + row[_PULL + w] + row[_NOISE + w] + at * row[_HISS + w])
         e += lam * row[_GAIN + w] * (before[w] - row[_TIP + w])
         behind = w0 * min(max(row[_PLAY + w] - e, -r0), r0) + w1 * min(max(row[_PLAY + WIDTH + w] - e, -r1), r1)
         behind += w2 * min(max(row[_PLAY + 2 * WIDTH + w] - e, -r2), r2)
@@ -95,12 +97,19 @@ def kick_all(
 
 
 @inlined
+def pull_all(row: Floats, above: Floats, row_lam: float) -> None:
+    """Keep the force through the link from the actuator above, whose tips `above` are."""
+    for w in range(WIDTH):
+        row[_PULL + w] = row_lam * (above[w] - row[_TIP + w])
+
+
+@inlined
 def push_all(row: Floats, before: Floats, made: Floats, at: float, force: float, lam: float, piezo: Floats) -> None:
     """Push the plays by the electric force; `made` gets what they and the rest make of it, without creep."""
     whole, r0, r1, r2, r3 = piezo[0], piezo[1], piezo[2], piezo[3], piezo[4]
     w0, w1, w2, w3 = piezo[5], piezo[6], piezo[7], piezo[8]
     for w in range(WIDTH):
-        e = row[_MOVES + w] * (force + row[_NOISE + w] + at * row[_HISS + w])
+        e = row[_MOVES + w] * (force + row[_PULL + w] + row[_NOISE + w] + at * row[_HISS + w])
         e += lam * row[_GAIN + w] * (before[w] - row[_TIP + w])
         p0 = min(max(row[_PLAY + w] - e, -r0), r0)
         p1 = min(max(row[_PLAY + WIDTH + w] - e, -r1), r1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chainsim import Chain, Response, Setting, SettingSweep, solve as solve_chain
+from chainsim import Chain, Device, Response, Setting, SettingSweep, solve as solve_chain
 
 __all__ = ["solve", "sweep"]
 
@@ -67,6 +67,9 @@ def sweep(
     omega: ArrayLike = 1.0,
     tol: float = 1e-6,
     from_rest: bool = True,
+    as_built: Device | str | None = None,
+    devices: int = 64,
+    seed: int = 0,
     **fixed: Any,
 ) -> Any:
     """The steady states of a chain at every combination of some settings.
@@ -85,6 +88,12 @@ def sweep(
         Relative to each setting's largest amplitude.
     from_rest : bool
         What a sudden drive reaches; else the lower branch, which is quicker.
+    as_built : Device or str
+        Also ask what chains reach that are drawn with what surrounds this device: `yield`, the share with the same
+        outcome, `worst`, the actuator that is farthest off (from 0, -1 where none is known), `deviation`, the median of
+        how far over the largest amplitude, and `spoiler`, the effect that alone spoils most. Takes seconds a setting.
+    devices, seed : int
+        How many are drawn, and from what.
     **fixed
         `preload`, `bias`, `phase` and, of a grid, `lam_y`, as `Setting.of` takes them.
 
@@ -99,6 +108,8 @@ def sweep(
     ------
     ValueError
         When a shape does not fit, or a number is out of range.
+    dotwave.AppError
+        When chains of its kind are not drawn.
 
     Examples
     --------
@@ -112,9 +123,17 @@ def sweep(
     from ..studies.sweep import FIELDS, answers
 
     columns = _column("epsilon", epsilon, 1), _column("lam", lam, 2), _column("omega", omega, 1)
+    wanted = tuple(name for name in FIELDS if name not in AXES)
     shape = tuple(len(column) for column in columns)
     many = SettingSweep(chain, tol, from_rest, columns, shape, {"preload": 0.0, "bias": 0.0, "phase": 0.0} | fixed)
-    flat = answers(many, 0, len(many), tuple(name for name in FIELDS if name not in AXES))
+    drawn = None
+    if as_built is not None:
+        from ..as_built.settings import AS_BUILT_FIELDS, AsBuiltSettings
+        from .scenes import device as device_of
+
+        drawn = AsBuiltSettings(device_of(as_built), devices, seed)
+        wanted += AS_BUILT_FIELDS
+    flat = answers(many, 0, len(many), wanted, drawn)
     arrays = {name: values.reshape(*shape, *values.shape[1:]) for name, values in flat.items()}
     return _named(arrays, dict(zip(AXES, columns, strict=True)))
 

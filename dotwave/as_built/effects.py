@@ -12,6 +12,7 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "hysteresis": ("hysteresis", "saturation"),
     "creep": ("creep_per_decade", "creep_first_s"),
     "higher modes": ("modes",),
+    "2-D coupling": ("row_lam",),
     "amplifier dynamics": ("bandwidth_hz",),
     "amplifier noise": ("amplifier_noise",),
     "rounding": ("converter_bits",),

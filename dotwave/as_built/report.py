@@ -67,7 +67,6 @@ class AsBuiltReport:
     verdict : on them, with all effects together.
     effects : each effect alone, and none at all.
     assumed : which values of the surroundings are assumed.
-    notes : sentences a person should read.
     seconds : time taken.
     """
 
@@ -78,7 +77,6 @@ class AsBuiltReport:
     verdict: Verdict
     effects: tuple[EffectAlone, ...]
     assumed: tuple[str, ...]
-    notes: tuple[str, ...]
     seconds: float
 
     @property
@@ -118,7 +116,7 @@ class AsBuiltReport:
             "histogram": {"edges_db": edges, "devices": counts},
             "spoilers": list(self.spoilers),
             "effects": [one.as_dict() for one in self.effects],
-            "assumed": list(self.assumed), "notes": list(self.notes), "seconds": self.seconds,
+            "assumed": list(self.assumed), "seconds": self.seconds,
         }  # fmt: skip
 
     def as_text(self) -> str:
@@ -144,7 +142,6 @@ class AsBuiltReport:
         yield "Each effect alone:"
         yield from (one.line() for one in self.effects)
         yield f"Assumed, not measured: {', '.join(self.assumed) or 'nothing'}."
-        yield from self.notes
         yield f"Time taken: {self.seconds:.2f} s."
 
     def _bars(self) -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from chainsim import Surroundings, assumed_of, surroundings_of
+from chainsim import assumed_of, surroundings_of
 from drivers import Manifest, read_waveform
 
 from ..errors import AppError
@@ -92,7 +92,7 @@ def verify_as_built(path: Path, study: AsBuiltStudy) -> AsBuiltReport:
             EffectAlone(effect, tried[effect], bool(set(EFFECTS.get(effect, ())) & set(assumed)), of_effect[effect])
             for effect in (AS_PLANNED, *present(around))
         ),
-        assumed=assumed, notes=tuple(_notes(around)), seconds=time.perf_counter() - began,
+        assumed=assumed, seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 
@@ -106,8 +106,3 @@ def _verdicts(path: Path, batches: list[Batch], scheduler: str | None, told: Cal
     if scheduler is None:
         return [verdict_on(path, batch, told) for batch in batches]
     return verdicts_on_cluster(path, batches, scheduler, told)
-
-
-def _notes(around: Surroundings) -> Iterator[str]:
-    if around.row_lam:
-        yield "The coupling between rows (row_lam) is left out."

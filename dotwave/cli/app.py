@@ -21,7 +21,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import EmphasisChoice, Grade, ImageChoice, Mathematics, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation, Undefined
 
 from ..errors import AppError, Terminated
 from .command import (
@@ -74,6 +74,9 @@ Start = Annotated[
     str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
 ]
 
+Lines = Annotated[LineEnds | None, typer.Option(help="Single line ends: a new line too, or a blank.")]
+Numbers = Annotated[PageNumbering | None, typer.Option(help="Nowhere, in a page's last cells, in frames of their own.")]
+
 
 @app.command(short_help="Render text as Braille that can be felt.", rich_help_panel=RENDER)
 def text(
@@ -105,6 +108,8 @@ def text(
     math: Annotated[Mathematics | None, typer.Option(help="Formulas of documents, in Nemeth code or words.")] = None,
     start_at: Start = None,
     pages: Annotated[str | None, typer.Option(help="Only these, such as 10-20; counted from --from.")] = None,
+    lines: Lines = None,
+    page_numbers: Numbers = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -137,7 +142,8 @@ def text(
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
         rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
-        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
+        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages, lines=lines,
+        page_numbers=page_numbers,
     )  # fmt: skip
     profile = device_of(device)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
@@ -261,7 +267,7 @@ def doctor(as_json: Json = False) -> None:
 @cache
 def application() -> typer.Typer:
     """All commands."""
-    for name in ("pictures", "study", "plan", "play"):
+    for name in ("pictures", "study", "plan", "play", "live"):
         app.add_typer(import_module(f".{name}", __package__).commands)
     return app
 

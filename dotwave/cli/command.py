@@ -10,8 +10,7 @@ import typer
 from drivers import SUFFIXES
 
 from ..errors import AppError
-from ..plain import printable
-from ..reports.printable import Printable
+from ..plain import Printable, printable
 from .completion import completed_devices, completed_files
 
 __all__ = [

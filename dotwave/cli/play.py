@@ -38,6 +38,9 @@ def play(
     patience: Annotated[
         float | None, typer.Option(min=0.1, help="Seconds to wait for a controller not heard; default: 10.")
     ] = None,
+    parametric: Annotated[
+        bool, typer.Option("--parametric", help="No samples: the controller draws it itself.")
+    ] = False,
     board: Annotated[BoardModel | None, typer.Option(help="A board that plays by itself, instead.")] = None,
     firmware: Annotated[BoardFirmware | None, typer.Option(help="What runs on the board; default: test-pixel.")] = None,
     audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
@@ -67,6 +70,7 @@ def play(
 
     report = run(
         Path(out), live=live, port=port, board=board is not None, audio=audio, to=to, baud=baud, patience_s=patience,
+        parametric=parametric or None,
         firmware=None if firmware is None else Firmware(firmware.value), mapping=channels,
         adapt=Adapting(noise, not amplitudes) if adapt else None,
     )  # fmt: skip

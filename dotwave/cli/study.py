@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import AppError
 from .command import Device, Json, finish, say
 from .completion import completed_files
 from .help import STUDY
@@ -61,6 +62,15 @@ def sweep(
     only: Annotated[str | None, typer.Option(help="Fields to write, with commas between; default: all.")] = None,
     picture: Annotated[Path | None, typer.Option(help="Also a map of two ranges, as PNG (needs an .npz).")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes side by side.")] = 1,
+    as_built: Annotated[
+        bool, typer.Option("--as-built", help="Also what chains drawn at random reach, by what surrounds --device.")
+    ] = False,
+    device: Device = "paper-6x6",
+    devices: Annotated[int | None, typer.Option(min=1, help="How many with --as-built; default: 64.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of what is drawn; default: 0.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler whose workers solve it.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Solve a chain at every combination of its ranges, or at every row of a table.
@@ -68,15 +78,26 @@ def sweep(
     epsilon, lam and omega are numbers or ranges {from, to, steps, log}, or come from a table (.npz, .csv). Stopped
     halfway, the same call goes on where it was.
 
+    --as-built adds the share of chains that reach the same outcome with all that the profile's section surroundings
+    tells or assumes, the actuator that is farthest off, and the effect that spoils most.
+
     \b
     Example:
       dotwave sweep sweep.yaml -o sweep.npz --picture map.png
     """
     from ..figures.sweep_map import draw_map
-    from ..studies.sweep import FIELDS, run_sweep
+    from ..studies.sweep import run_sweep
 
-    fields = FIELDS if only is None else tuple(name.strip() for name in only.split(","))
-    report = run_sweep(chain, output, only=fields, workers=workers)
+    fields = None if only is None else tuple(name.strip() for name in only.split(","))
+    drawn = None
+    if as_built:
+        from ..api.scenes import device as device_of
+        from ..as_built.settings import AsBuiltSettings
+
+        drawn = AsBuiltSettings(device_of(device), devices or 64, seed or 0)
+    elif devices is not None or seed is not None:
+        raise AppError("--devices, --seed: they belong to --as-built; add that, or leave them out")
+    report = run_sweep(chain, output, only=fields, workers=workers, as_built=drawn, scheduler=scheduler)
     if picture is not None:
         draw_map(chain, output, picture)
     finish(report, as_json, ok=True)

@@ -145,11 +145,13 @@ def _draw_words(pen: ImageDraw.ImageDraw, shape: CardShape, frame: FrameCheck, n
 def _draw_caption(card: Image.Image, shape: CardShape, frame: FrameCheck) -> None:
     """The text of the frame; its cells when the built-in font lacks a letter of it."""
     words = plain_letters(frame.text)
+    # The number of a page has cells and no text.
+    shown = words or frame.wanted_cells.strip("\u2800\n")
     room = shape.size[0] - 2 * PAD
     pen = ImageDraw.Draw(card)
     if words and has_glyphs(words):
         pen.text((PAD, CAPTION_BASE), fit(words, font(24), room), font=font(24), fill=INK, anchor="ls")
-    elif words and cells_width(frame.wanted_cells, CAPTION_DOT_PITCH) <= room:
+    elif shown and cells_width(frame.wanted_cells, CAPTION_DOT_PITCH) <= room:
         draw_cells(card, (PAD, CAPTION_Y), frame.wanted_cells, CAPTION_DOT_PITCH)
-    elif not words:
+    elif not shown:
         pen.text((PAD, CAPTION_BASE), "blank", font=font(24), fill=MUTED, anchor="ls")

@@ -1,4 +1,4 @@
-"""A map of a sweep over two ranges: outcome, lag of the last link and stability, side by side."""
+"""A map of a sweep over two ranges: outcome, lag of the last link and stability, and as built yield, side by side."""
 
 from __future__ import annotations
 
@@ -19,11 +19,18 @@ if TYPE_CHECKING:
 __all__ = ["NEEDED", "draw_map"]
 
 NEEDED = ("outcome", "phase_step_deg", "stable")
-"""Fields a map is drawn from."""
+"""Fields a map is drawn from; beside them, where they are there, the yield as built and the effect that spoils most."""
 
-COLOURS = {
+Colours = dict[str, tuple[int, int, int]]
+
+COLOURS: Colours = {
     "ok": (38, 102, 148), "unstable": (214, 96, 77), "escaped": (60, 20, 60), "not_locked": (230, 171, 2),
     "no_convergence": (120, 120, 120), "out_of_budget": (180, 180, 180), "unreachable": (0, 0, 0),
+}  # fmt: skip
+SPOILERS: Colours = {
+    "spread": (38, 102, 148), "hysteresis": (214, 96, 77), "creep": (230, 171, 2), "higher modes": (60, 20, 60),
+    "amplifier dynamics": (102, 166, 30), "amplifier noise": (117, 112, 179), "rounding": (180, 180, 180),
+    "preload": (0, 0, 0),
 }  # fmt: skip
 MARGIN, TITLE = 90, 40
 TALLEST = 2000
@@ -57,14 +64,20 @@ def draw_map(source: Path, solved: Path, picture: Path) -> None:
         if missing:
             raise AppError(f"{solved}: has no {missing[0]}; a map needs {', '.join(NEEDED)}")
         outcome, steps, stable = (stored[name] for name in NEEDED)
+        drawn = [stored[name].reshape(rows, cols) for name in ("yield", "spoiler") if name in stored]
     shape = (rows, cols)
     lag = steps[:, -1].reshape(shape) if steps.shape[1] else np.full(shape, np.nan)
     panels = [
-        ("outcome", _coloured(outcome.reshape(shape))),
+        ("outcome", _coloured(outcome.reshape(shape), COLOURS)),
         ("lag of the last link, -180 (dark) .. 180 deg", _shaded(lag)),
         ("stable (light)", _grey(stable.reshape(shape))),
     ]
-    _paint(panels, up, right, picture)
+    legends = [COLOURS]
+    if len(drawn) == 2:
+        panels.append(("yield as built, 0 (dark) .. 1", _grey(np.nan_to_num(drawn[0]))))
+        panels.append(("what spoils most", _coloured(drawn[1], SPOILERS)))
+        legends.append(SPOILERS)
+    _paint(panels, legends, up, right, picture)
 
 
 def _axes(source: Path, sweep: SettingSweep) -> tuple[int, int, _Axis, _Axis]:
@@ -76,10 +89,10 @@ def _axes(source: Path, sweep: SettingSweep) -> tuple[int, int, _Axis, _Axis]:
     return sweep.shape[wide[0]], sweep.shape[wide[1]], ends[0], ends[1]
 
 
-def _coloured(outcome: NDArray[np.str_]) -> NDArray[np.uint8]:
-    image = np.zeros((*outcome.shape, 3), dtype=np.uint8)
-    for name, colour in COLOURS.items():
-        image[outcome == name] = colour
+def _coloured(words: NDArray[np.str_], colours: Colours) -> NDArray[np.uint8]:
+    image = np.full((*words.shape, 3), 255, dtype=np.uint8)
+    for name, colour in colours.items():
+        image[words == name] = colour
     return image
 
 
@@ -92,11 +105,13 @@ def _shaded(lag: NDArray[np.float64]) -> NDArray[np.uint8]:
     return shades
 
 
-def _grey(stable: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    return np.repeat(np.where(stable, 235, 60).astype(np.uint8)[..., None], 3, axis=2)
+def _grey(share: NDArray[Any]) -> NDArray[np.uint8]:
+    return np.repeat((60 + 175 * share).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def _paint(panels: list[tuple[str, NDArray[np.uint8]]], up: _Axis, right: _Axis, picture: Path) -> None:
+def _paint(
+    panels: list[tuple[str, NDArray[np.uint8]]], legends: list[Colours], up: _Axis, right: _Axis, picture: Path
+) -> None:
     # Imported here: only a picture needs it.
     from PIL import Image, ImageDraw
 
@@ -116,14 +131,15 @@ def _paint(panels: list[tuple[str, NDArray[np.uint8]]], up: _Axis, right: _Axis,
             pen.text((4, bottom - 12), f"{up.first:.4g}", fill="black", font_size=10 + height // 100)
             pen.text((4, TITLE), f"{up.last:.4g}", fill="black", font_size=10 + height // 100)
             pen.text((4, TITLE + height // 2), up.name, fill="black", font_size=10 + height // 100)
-    _legend(pen, height)
+    for number, colours in enumerate(legends):
+        _legend(pen, colours, height, number)
     with atomic_file(picture) as file, naming(picture):
         whole.save(file, format="PNG", **_FAST)
 
 
-def _legend(pen: Any, height: int) -> None:
-    for number, (name, colour) in enumerate(COLOURS.items()):
-        top, left = TITLE + height + 36, MARGIN + number * (90 + height // 8)
+def _legend(pen: Any, colours: Colours, height: int, line: int) -> None:
+    for number, (name, colour) in enumerate(colours.items()):
+        top, left = TITLE + height + 36 + line * (14 + height // 100), MARGIN + number * (90 + height // 8)
         pen.rectangle((left, top, left + 10, top + 10), fill=colour)
         pen.text((left + 14, top - 2), name, fill="black", font_size=10 + height // 100)
 

@@ -16,6 +16,7 @@ from encoders import Frame, PictureOptions, TargetPattern
 from ..errors import AppError
 from ..rendering.extent import extent_of, go_on
 from .journal import Journal
+from .metadata import told_of
 from .pool import ClusterPool, LocalPool, Pool
 from .report import IconsReport
 from .run import CANDIDATES, IconOptions, IconRun
@@ -73,7 +74,7 @@ def render_icons(
         ClusterPool(options.scheduler) if options.scheduler else LocalPool(options.workers, options.icon_seconds)
     )
     with Journal(out / JOURNAL) as journal:
-        run = IconRun(recipe, options, out, places, journal, clock=clock)
+        run = IconRun(recipe, options, out, places, journal, told=told_of(places), clock=clock)
         try:
             with pool:
                 run.work(pool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,22 +25,27 @@ Pixels = NDArray[np.uint8]
 MOST_LARGE = 400
 MOST_ON_A_SHEET = 2400
 SMOOTH = 4
+DOUBT_LINES = 3
 PANEL = (244, 246, 248)
 
 
 @dataclass(frozen=True)
 class _Size:
-    """Pixels: `side` of a pattern's longer side, `pad` around a card, `gap` inside it, `text` of its name."""
+    """Pixels: `side` of a pattern's longer side, `pad` around a card, `gap` inside it, `text` of its name.
+
+    `doubt` is that of the sentence below it, 0 where there is only room for a question mark.
+    """
 
     side: int
     pad: int
     gap: int
     text: int
     figure: bool
+    doubt: int
 
 
-LARGE = _Size(side=108, pad=14, gap=12, text=15, figure=True)
-SMALL = _Size(side=48, pad=6, gap=4, text=9, figure=False)
+LARGE = _Size(side=108, pad=14, gap=12, text=15, figure=True, doubt=11)
+SMALL = _Size(side=48, pad=6, gap=4, text=9, figure=False, doubt=0)
 
 
 def contact_sheets(icons: Sequence[Icon]) -> dict[str, bytes]:
@@ -56,7 +62,8 @@ def contact_sheets(icons: Sequence[Icon]) -> dict[str, bytes]:
 def _sheet(icons: Sequence[Icon], size: _Size) -> Image.Image:
     high, wide = _panel(icons[0].pattern.amplitude.shape, size).shape[:2]
     across = wide * 2 + size.gap if size.figure else wide
-    card = across + 2 * size.pad, high + 2 * size.pad + size.gap + size.text
+    doubt = DOUBT_LINES * (size.doubt + 3) if any(icon.doubt for icon in icons) else 0
+    card = across + 2 * size.pad, high + 2 * size.pad + size.gap + size.text + (doubt if size.doubt else 0)
     columns = max(1, min(len(icons), round((len(icons) * card[1] / card[0] * 1.5) ** 0.5)))
     rows = -(-len(icons) // columns)
     picture = Image.new("RGB", (columns * card[0], rows * card[1]), PAPER)
@@ -68,15 +75,21 @@ def _sheet(icons: Sequence[Icon], size: _Size) -> Image.Image:
             drawn = Image.fromarray(figure_picture(icon.figure)).resize((wide, high), Image.Resampling.BICUBIC)
             picture.paste(drawn, (left, top))
         picture.paste(Image.fromarray(_pattern(icon.pattern.amplitude, size)), (left + across - wide, top))
-        name = _name(icon.name, size.text, across)
+        name = _name(icon.name, size.text, across, "? " if icon.doubt else "")
         colour = INK if icon.outcome == "ok" else MUTED
         pen.text((left, top + high + size.gap), name, font=letters, fill=colour, anchor="lt")
+        if icon.doubt and size.doubt:
+            small = font(size.doubt)
+            lines = textwrap.wrap(f"Doubt: {icon.doubt}", int(across / small.getlength("n")))[:DOUBT_LINES]
+            for number, line in enumerate(lines, 1):
+                below = top + high + size.gap + size.text + number * (size.doubt + 3)
+                pen.text((left, below), line, font=small, fill=INK, anchor="ls")
     return picture
 
 
-def _name(name: str, size: int, room: int) -> str:
-    """The last part of a name without its suffix, as much of it as there is room for."""
-    stem = PurePosixPath(name).stem
+def _name(name: str, size: int, room: int, mark: str) -> str:
+    """The last part of a name without its suffix, after a mark, as much of it as there is room for."""
+    stem = mark + PurePosixPath(name).stem
     long = font(size).getlength(stem) / room
     return stem if long <= 1 else fit(stem[: int(len(stem) / long) + 1], font(size), room)
 

@@ -31,7 +31,8 @@ class IconsReport:
     icons : sorted by name.
     device : name of the profile.
     distinct : whether patterns were chosen to differ.
-    closer_than, close : pairs (name, name, distance) nearer than that, the nearest first.
+    closer_than, close : pairs (name, name, distance) nearer than that, the nearest first. One file is one icon, under
+        however many names.
     pairs : how many pairs have each distance, from 0.
     failed : name -> what is wrong with it.
     unfinished : names that were not reached; `complete` is then False.
@@ -60,12 +61,15 @@ class IconsReport:
         """The report with the distances of every pair worked out."""
         if not icons:
             return cls((), closer_than=closer_than, close=(), pairs=(), failed=dict(sorted(failed.items())), **known)
-        apart = distinctness(felt_set(icons), closer_than)
-        told = tuple(
-            replace(icon, nearest=icons[near].name, distance=distance) if near >= 0 else icon
-            for icon, near, distance in zip(icons, apart.nearest.tolist(), apart.distance.tolist(), strict=True)
-        )
-        close = tuple((icons[one].name, icons[other].name, distance) for one, other, distance in apart.close)
+        own = [icon for icon in icons if not icon.same_as]
+        apart = distinctness(felt_set(own), closer_than)
+        near = {
+            icon.name: {"nearest": own[index].name, "distance": distance}
+            for icon, index, distance in zip(own, apart.nearest.tolist(), apart.distance.tolist(), strict=True)
+            if index >= 0
+        }
+        told = tuple(replace(icon, **near.get(icon.same_as or icon.name, {})) for icon in icons)
+        close = tuple((own[one].name, own[other].name, distance) for one, other, distance in apart.close)
         pairs = tuple(np.trim_zeros(apart.pairs, "b").tolist())
         return cls(
             told, closer_than=closer_than, close=close, pairs=pairs, failed=dict(sorted(failed.items())), **known
@@ -84,7 +88,13 @@ class IconsReport:
     @property
     def neighbours(self) -> int:
         """Icons with another one nearer than `closer_than`."""
-        return sum(icon.distance is not None and icon.distance < self.closer_than for icon in self.icons)
+        near = (icon.distance for icon in self.icons if not icon.same_as)
+        return sum(distance is not None and distance < self.closer_than for distance in near)
+
+    @property
+    def doubted(self) -> int:
+        """Icons whose pattern may not be known."""
+        return sum(bool(icon.doubt) for icon in self.icons)
 
     def manifest(self) -> dict[str, Any]:
         """What is written as JSON: the same for the same pictures and options, whoever did the work."""
@@ -96,6 +106,7 @@ class IconsReport:
             "similarity": round(self.similarity, 6),
             "closer_than": self.closer_than,
             "with_neighbour": self.neighbours,
+            "doubted": self.doubted,
             "pairs_by_distance": list(self.pairs),
             "icons": [icon_row(icon) for icon in self.icons],
             "close": [list(pair) for pair in self.close],
@@ -116,6 +127,7 @@ class IconsReport:
         outcomes = Counter(icon.outcome for icon in self.icons)
         yield f"Icons: {len(self.icons)} for {self.device}, " + ", ".join(f"{n} {k}" for k, n in outcomes.items()) + "."
         yield f"Mean similarity: {self.similarity:.3f}."
+        yield f"In doubt: {self.doubted}; the manifest says why."
         if self.distinct:
             lost = sum(icon.lost for icon in self.icons) / max(1, len(self.icons))
             yield f"Given up so that icons differ: {lost:.3f} on average."
@@ -148,11 +160,16 @@ def icon_row(icon: Icon) -> dict[str, Any]:
         "pattern": pattern,
         "braille": in_braille(icon.pattern.amplitude),
         "similarity": icon.pattern.similarity,
+        "doubt": icon.doubt,
         "lost": icon.lost,
         "outcome": icon.outcome,
         "error": icon.error,
         "nearest": icon.nearest,
         "distance": icon.distance,
+        "same_as": icon.same_as,
+        "label": icon.label,
+        "code_point": icon.code_point,
+        "category": icon.category,
         "waveform": icon.waveform,
         "note": "; ".join(part for part in (icon.note, *icon.notes) if part),
     }

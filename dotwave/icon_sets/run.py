@@ -82,6 +82,7 @@ class IconRun:
     lost: dict[str, str] = field(default_factory=dict)
     chosen: dict[str, Pattern] = field(default_factory=dict)
     waves: dict[str, str] = field(default_factory=dict)
+    told: Mapping[str, dict[str, str]] = field(default_factory=dict)
     worked: int = 0
     clock: Callable[[], float] = time.monotonic
     began: float = field(init=False)
@@ -100,12 +101,24 @@ class IconRun:
         """Do what is not in the journal yet."""
         self._encode(pool, self.recipe, self.places, self.keys)
         if self.options.distinct:
+            alone = {name: key for name, key in self.keys.items() if name not in self._same()}
             self.chosen = chosen_patterns(
-                self._records(self.keys), self.recipe.shape, lambda names: self._more(pool, names)
+                self._records(alone), self.recipe.shape, lambda names: self._more(pool, names)
             )
+            self.chosen |= {name: self.chosen[other] for name, other in self._same().items() if other in self.chosen}
             self._plan(pool)
         if self.options.waveforms:
             self._write(pool)
+
+    def _same(self) -> dict[str, str]:
+        """Icons whose file is that of another, and the first of those: one file is one icon."""
+        first: dict[str, str] = {}
+        found = {}
+        for name in sorted(self.keys):
+            other = first.setdefault(self.digests[name], name)
+            if other != name:
+                found[name] = other
+        return found
 
     def _records(self, keys: Mapping[str, str]) -> dict[str, Record]:
         """Records of the icons that were encoded."""
@@ -228,10 +241,15 @@ class IconRun:
 
     def icons(self) -> Iterator[Icon]:
         """Every icon that was encoded, sorted by name."""
+        same = self._same()
         for name in sorted(self.keys):
             record = self.journal.find(self.keys[name])
             if record is not None and "bad" not in record:
-                yield self._icon(name, record)
+                told = self.told.get(name, {})
+                yield replace(
+                    self._icon(name, record), same_as=same.get(name, ""), label=told.get("label", ""),
+                    code_point=told.get("code_point", ""), category=told.get("category", ""),
+                )  # fmt: skip
 
     def _icon(self, name: str, record: Record) -> Icon:
         best = best_pattern(record, self.recipe.shape)
@@ -250,7 +268,7 @@ class IconRun:
             name=name, digest=self.digests[name], kind=record["kind"], pattern=pattern,
             lost=round(best.similarity - pattern.similarity, 6), figure=figure_of(record, self.recipe.shape),
             outcome=outcome, error=error, note=note,
-            notes=tuple(notes), waveform=self.waves.get(name, ""),
+            notes=tuple(notes), doubt=record["doubt"], waveform=self.waves.get(name, ""),
         )  # fmt: skip
 
     def report(self, *, complete: bool, seconds: float) -> IconsReport:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from encoders import (
     choose_distinct,
     distinctness,
     felt_codes,
+    margins,
     similarities,
     weakened,
 )
@@ -60,9 +61,12 @@ class Icon:
     figure : uint8, shape (4 rows, 4 cols), 255 = figure: what the pattern should be like.
     outcome, error, note : of the plan; "not_planned" when it was not reached.
     notes : of the reading.
+    doubt : why its pattern may not be known, in one sentence; empty where nothing speaks against it.
     waveform : the .wav below the output folder, empty when there is none.
     nearest, distance : the icon that feels most alike, and by how many actuators it differs; empty and None
         in a set of one.
+    same_as : the first icon of the set with the same file, empty where it is itself the first.
+    label, code_point, category : what the icon font's package says of it, empty where it says nothing.
     """
 
     name: str
@@ -75,9 +79,14 @@ class Icon:
     error: float | None = None
     note: str = ""
     notes: tuple[str, ...] = ()
+    doubt: str = ""
     waveform: str = ""
     nearest: str = ""
     distance: int | None = None
+    same_as: str = ""
+    label: str = ""
+    code_point: str = ""
+    category: str = ""
 
 
 def figure_of(record: Record, shape: GridShape) -> NDArray[np.uint8]:
@@ -108,6 +117,7 @@ def chosen_patterns(
 ) -> dict[str, Pattern]:
     """One pattern for each icon, no two nearer than `encoders.APART` where that can be.
 
+    Of patterns that are as far apart those are taken that say what is peculiar to an icon (`encoders.margins`).
     First among the patterns of the records; icons that still have a neighbour get more patterns, and if that does
     not help either, textured ones (some or all dots 6 dB weaker).
 
@@ -117,9 +127,13 @@ def chosen_patterns(
     """
     names = sorted(records)
     choices = {name: _choice(records[name], shape) for name in names}
+    figures = np.stack([figure_of(records[name], shape) for name in names]) / 255.0 if names else np.empty(0)
 
     def choose() -> tuple[dict[str, int], list[str]]:
-        picked = choose_distinct([choices[name] for name in names])
+        some = [choices[name] for name in names]
+        patterns = [AMPLITUDES[one.codes].reshape(-1, shape.rows, shape.cols) for one in some]
+        worth = margins(figures, patterns, [one.similarity for one in some])
+        picked = choose_distinct([replace(one, similarity=value) for one, value in zip(some, worth, strict=True)])
         codes = np.stack([choices[name].codes[index] for name, index in zip(names, picked, strict=True)])
         close = {place for pair in distinctness(codes, APART).close for place in pair[:2]}
         return dict(zip(names, picked.tolist(), strict=True)), [names[place] for place in sorted(close)]

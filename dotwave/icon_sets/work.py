@@ -126,9 +126,9 @@ def encode_icons(recipe: Recipe, tasks: Sequence[Task]) -> Iterator[Record]:
 
     Yields
     ------
-    Records with ``kind``, ``frames`` (of an animation; the first is the icon), ``notes``, ``figure`` (bytes 0..255
-    in base64), ``options`` (bits of the good patterns, each filled up to bytes, in base64), their ``similarity``,
-    best first, and ``plan`` as of `plan_patterns`; or ``bad``, one line on what is wrong with the picture.
+    Records with ``kind``, ``frames`` (of an animation; the first is the icon), ``notes``, ``doubt``,
+    ``figure`` (bytes 0..255 in base64), ``options`` (bits of the good patterns, each filled up to bytes, in base64),
+    their ``similarity``, best first, and ``plan`` as of `plan_patterns`; or ``bad``, one line on what is wrong.
     """
     return (_encoded(recipe, task) for task in tasks)
 
@@ -147,6 +147,7 @@ def _encoded(recipe: Recipe, task: Task) -> Record:
         "kind": report.kind,
         "frames": len(report.frames),
         "notes": list(report.notes),
+        "doubt": first.doubt,
         "figure": base64.b64encode(np.rint(first.figure * 255).astype(np.uint8).tobytes()).decode(),
         "options": base64.b64encode(bits.tobytes()).decode(),
         "similarity": [round(one.similarity, DIGITS) for one in candidates],

@@ -18,7 +18,8 @@ from .report import IconsReport, icon_row
 __all__ = ["write_report"]
 
 COLUMNS = (
-    "name", "digest", "pattern", "similarity", "outcome", "error", "nearest", "distance", "lost", "waveform", "note",
+    "name", "label", "code_point", "category", "digest", "same_as", "pattern", "similarity", "doubt", "outcome",
+    "error", "nearest", "distance", "lost", "waveform", "note",
 )  # fmt: skip
 
 

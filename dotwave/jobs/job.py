@@ -33,7 +33,9 @@ from chainsim import (
 from encoders import (
     EmphasisChoice,
     ImageChoice,
+    LineEnds,
     Mathematics,
+    PageNumbering,
     PictureOptions,
     Presentation,
     Style,
@@ -183,6 +185,8 @@ class TextPart(Part):
     encoding: str | None = None
     start_at: Annotated[str | int | None, Field(alias="from")] = None
     pages: str | int | None = None
+    lines: LineEnds | None = None
+    page_numbers: PageNumbering = PageNumbering.NONE
 
     short: ClassVar[str] = "say"
 

@@ -167,6 +167,8 @@ def play(
     if adapt is not None:
         if address is None or not address.startswith("controller:"):
             raise AppError("--adapt: only a controller measures what it plays; give its --port")
+        if given.get("parametric"):
+            raise AppError("--adapt and --parametric: what is corrected goes out as samples; leave one of them out")
         adaptation, plan = adapt.to(manifest)
         given |= {"frames": plan.frames, "on_measured": adaptation.learned, "limits": limits}
     with nullcontext() if address is None else open_sink(address, limits=limits, **given) as sink:

@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..plain import one_line
-from .printable import Printable
+from ..plain import Printable, one_line
 from .totals import Spreading
 
 __all__ = ["Report", "margin_lines", "outcome_lines", "plain"]

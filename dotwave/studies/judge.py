@@ -15,7 +15,7 @@ from encoders import TargetPattern
 from planner import FramePlan, Plan
 
 from ..errors import AppError
-from ..reports.printable import Printable
+from ..plain import Printable
 from ..request import Request
 
 if TYPE_CHECKING:
@@ -124,6 +124,7 @@ class Judge:
         reached, met = self._reached(device) if held else ((), True)
         beside: dict[str, Printable] = {}
         if request.explain:
+            reached += tuple(self._standing(device))
             from .tradeoff import ExplainReport
 
             beside["requirement"] = ExplainReport(self._required(device, request.tol or USUAL_TOL))
@@ -138,6 +139,15 @@ class Judge:
             beside["yield"] = devices
             met = met and devices.met
         return Findings(reached, met, beside)
+
+    def _standing(self, device: Device) -> Iterator[str]:
+        """What a plan of standing dots leaves to the piezos; those that were measured are planned as they are."""
+        from planner import standing_error
+
+        frames = [] if device.actuators else [frame for frame in self._frames if frame.frame is not None]
+        worst = max((frame.error + standing_error(device, frame.states, frame.end_s) for frame in frames), default=0.0)
+        if worst > max((frame.error for frame in frames), default=0.0):
+            yield f"As built, standing dots are off by up to {_percent(worst)} (higher modes, creep, hysteresis)."
 
     def _yield(self) -> YieldReport | None:
         """On how many devices all frames are felt as wished; None where none has a spread."""
@@ -210,6 +220,10 @@ class Judge:
         lacking = {term.name: term.effect for term in terms if term.name not in modelled}
         listed = [f"{name} {_size(effect)}" for name, effect in lacking.items() if effect > 0]
         return f"left out of it: {', '.join(listed)}" if listed else "nothing is left out of it"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} % of full scale"
 
 
 def _size(effect: float) -> str:

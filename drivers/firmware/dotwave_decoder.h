@@ -1,4 +1,4 @@
-/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), versions 1 to 3.
+/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), versions 1 to 5.
  *
  * C99, one header, no allocation, no library but <stdint.h> and <stddef.h>. Feed it every byte that comes; it
  * passes over whatever is no packet, and never reads or writes outside its own struct, whatever the bytes are.
@@ -23,10 +23,10 @@
 #define DW_MAX_WIRE (DW_MAX_BODY + DW_MAX_BODY / 254u + 2u)
 
 enum dw_kind {
-    DW_HELLO = 0x01, DW_STATUS = 0x02, DW_HEARTBEAT = 0x03, DW_STOP = 0x04,
+    DW_HELLO = 0x01, DW_STATUS = 0x02, DW_HEARTBEAT = 0x03, DW_STOP = 0x04, DW_KEYED = 0x05,
     DW_START = 0x10, DW_COUPLING = 0x11, DW_BIAS = 0x12, DW_TONES = 0x13, DW_MARK = 0x14, DW_SAMPLES = 0x15,
-    DW_END = 0x16, DW_MEASURE = 0x17,
-    DW_CAPABILITIES = 0x81, DW_ACK = 0x82, DW_MARKED = 0x83, DW_REFUSED = 0x84, DW_MEASURED = 0x85
+    DW_END = 0x16, DW_MEASURE = 0x17, DW_ENVELOPE = 0x18,
+    DW_CAPABILITIES = 0x81, DW_ACK = 0x82, DW_MARKED = 0x83, DW_REFUSED = 0x84, DW_MEASURED = 0x85, DW_KEY = 0x86
 };
 
 typedef struct {
@@ -89,6 +89,7 @@ static inline int dw_length_fits(uint8_t kind, uint32_t length)
     switch (kind) {
     case DW_HELLO: fixed = 2; item = 0; break;
     case DW_STATUS: case DW_HEARTBEAT: case DW_STOP: fixed = 0; item = 0; break;
+    case DW_KEYED: fixed = 4; item = 0; break;
     case DW_START: fixed = 17; item = 1; break;
     case DW_COUPLING: fixed = 14; item = 2; break;
     case DW_BIAS: fixed = 18; item = 0; break;
@@ -97,11 +98,13 @@ static inline int dw_length_fits(uint8_t kind, uint32_t length)
     case DW_SAMPLES: fixed = 10; item = 2; break;
     case DW_END: fixed = 8; item = 0; break;
     case DW_MEASURE: fixed = 16; item = 8; break;
+    case DW_ENVELOPE: fixed = 22; item = 8; break;
     case DW_CAPABILITIES: fixed = 45; item = 1; break;
     case DW_ACK: fixed = 58; item = 4; break;
     case DW_MARKED: fixed = 20; item = 0; break;
     case DW_REFUSED: fixed = 4; item = 1; break;
-    case DW_MEASURED: fixed = 10; item = 12; break;
+    case DW_MEASURED: fixed = 10; item = 24; break;
+    case DW_KEY: fixed = 4; item = 2; break;
     default: return 0;
     }
     if (length < fixed || length > DW_MAX_PAYLOAD) return 0;

@@ -11,11 +11,12 @@ from planner import Measured
 
 from ..errors import DriverError
 from .cobs import DELIMITER
+from .keys import KeyEvent, KeyHearing
 from .measured import MeasuredFrames, MeasuredPart
 from .messages import VERSION, SamplesMessage, StartMessage
 from .outgoing import End, Message
 from .packet import Kind, Packet, PacketReader, encode
-from .replies import Ack, Capabilities, Flag, Marked, Refused, State
+from .replies import OPEN_SINCE, Ack, Capabilities, Flag, Marked, Refused, State
 from .under_way import UnderWay
 
 __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "Timing"]
@@ -23,6 +24,8 @@ __all__ = ["ControllerRefused", "HostSession", "SessionLost", "StreamReport", "T
 HELLO = encode(Packet(Kind.HELLO, 0, VERSION.to_bytes(2, "little")))
 HEARTBEAT = encode(Packet(Kind.HEARTBEAT))
 STOP = encode(Packet(Kind.STOP))
+MOST_LATE = 4096
+MOST_LEAD_S = 0.48
 
 
 class ControllerRefused(DriverError, ValueError):
@@ -50,7 +53,8 @@ class Timing:
     hello_s : and greets again after this.
     window : packets under way, at most 32.
     burst_bytes : sent at a time.
-    lead_s : seconds of samples that are sent ahead of those that play; before it plays, as many as start it.
+    lead_s : samples are asked for only while fewer seconds of them are ahead of what is played, twice as many after
+        each time that was too few; None: as many as the controller has room for.
     """
 
     heartbeat_s: float = 0.025
@@ -58,7 +62,7 @@ class Timing:
     hello_s: float = 0.25
     window: int = 32
     burst_bytes: int = 1 << 14
-    lead_s: float = math.inf
+    lead_s: float | None = None
 
 
 @dataclass
@@ -73,7 +77,8 @@ class StreamReport:
     underruns : times the controller's buffer ran dry.
     lost_s : seconds the output was held.
     bad_there, bad_here : frames that were no packet, at the controller and here.
-    late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first.
+    late_s : frame -> how much later than its mark it went out by the controller's clock, counted from the first; of
+        the latest `MOST_LATE` frames.
     reported_late_s : the same by the host's clock when the report came, so the line's delay is in it.
     least_buffer_s : smallest store in the controller between its first sample and the last one sent.
     buffer_s : what the controller has room for.
@@ -115,6 +120,7 @@ class HostSession:
     session : any number from 1 to 2^32 - 1.
     on_measured : gets what was measured of each frame, in order. A frame whose packets the line lost is not among them,
         and none is where the controller does not measure.
+    on_key : gets every key beside the grid that goes down or up, once and in order.
     """
 
     def __init__(
@@ -124,6 +130,7 @@ class HostSession:
         session: int,
         timing: Timing,
         on_measured: Callable[[Measured], None] | None = None,
+        on_key: Callable[[KeyEvent], None] | None = None,
     ) -> None:
         self._make = make
         self._session = session
@@ -135,6 +142,8 @@ class HostSession:
         self._window = UnderWay(timing.window, timing.resend_s)
         self._next = 0
         self._events = 0
+        self._sampled, self._lead_s = 0, timing.lead_s
+        self._keys, self._on_key, self._key_answer = KeyHearing(), on_key, b""
         self._ack: Ack | None = None
         self._hello_at = self._sent_at = -math.inf
         self._polled_at = math.inf
@@ -185,6 +194,8 @@ class HostSession:
                 self._acknowledged(ack, now)
             elif packet.kind is Kind.MARKED:
                 self._marked(Marked.of(packet), now)
+            elif packet.kind is Kind.KEY:
+                self._pressed(packet)
             elif packet.kind is Kind.MEASURED:
                 self._measured(MeasuredPart.of(packet))
             elif packet.kind is Kind.REFUSED:
@@ -204,7 +215,8 @@ class HostSession:
             return DELIMITER + HELLO
         self.report.longest_pause_s = max(self.report.longest_pause_s, now - self._polled_at)
         self._polled_at = now
-        out = bytearray()
+        out = bytearray(self._key_answer)
+        self._key_answer = b""
         while len(out) < self._timing.burst_bytes:
             wire = self._window.take(now)
             if wire is not None:
@@ -221,16 +233,17 @@ class HostSession:
     def _pull(self) -> bool:
         """Put the next message into the window, if there is one, room and credit."""
         assert self._messages is not None
-        if self._waiting is None:
+        if self._waiting is None and not self._far_ahead:
             self._waiting = next(self._messages, None)
         message, ack = self._waiting, self._ack
         if message is None or self._window.full:
             return False
         samples = 0
         if isinstance(message, SamplesMessage):
-            if ack is None or message.first + len(message.codes) > self._room(ack):
+            if ack is None or message.first + len(message.codes) > ack.accept_samples:
                 return False
             samples = len(message.codes)
+            self._sampled = message.first + samples
         elif not isinstance(message, StartMessage | End):
             if ack is None or self._events >= ack.accept_events:
                 return False
@@ -240,16 +253,16 @@ class HostSession:
         self._waiting = None
         return True
 
-    def _room(self, ack: Ack) -> int:
-        """Before which sample may be sent."""
-        found, lead_s = self.capabilities, self._timing.lead_s
-        if found is None or math.isinf(lead_s):
-            return ack.accept_samples
-        ahead = max(1, round(lead_s * found.rate_hz))
-        if ack.state is not State.PLAYING:
-            # Half of the buffer starts it; samples go out in packets.
-            ahead = max(ahead, (found.buffer_samples * 5) // 8)
-        return min(ack.accept_samples, ack.played + ahead)
+    @property
+    def _far_ahead(self) -> bool:
+        """Whether what follows may wait: what is not asked for yet can still become something else."""
+        found = self.capabilities
+        if self._lead_s is None or found is None:
+            return False
+        # Before there were open sessions, half of the buffer had to be full.
+        least = 0 if found.version >= OPEN_SINCE else found.buffer_samples / 2
+        played = 0 if self._ack is None else self._ack.played
+        return self._sampled - played >= max(least, self._lead_s * found.rate_hz)
 
     def _greeted(self, found: Capabilities, now: float) -> None:
         if self._phase is not _Phase.GREETING:
@@ -277,9 +290,11 @@ class HostSession:
         self._ack = ack
         self._confirm(ack.next_number, ack.kept or 0, now)
         report = self.report
+        if ack.underruns > report.underruns and self._lead_s is not None:
+            self._lead_s = max(self._lead_s, min(2 * self._lead_s, MOST_LEAD_S))
         report.underruns, report.lost_s, report.bad_there = ack.underruns, ack.held_ms / 1000, ack.bad
         streaming = self._waiting is not None or self._window
-        if ack.state is State.PLAYING and ack.played and streaming and self.capabilities is not None:
+        if ack.state is State.PLAYING and ack.played and ack.received and streaming and self.capabilities is not None:
             stored = (ack.received - ack.played) / self.capabilities.rate_hz
             report.least_buffer_s = min(report.least_buffer_s, stored)
         if Flag.GAP in ack.flags:
@@ -300,6 +315,16 @@ class HostSession:
         wanted_s = (marked.at - first.at) / self.capabilities.rate_hz
         self.report.late_s[marked.frame] = 1e-6 * (marked.clock_us - first.clock_us) - wanted_s
         self.report.reported_late_s[marked.frame] = now - began - wanted_s
+        for late_s in (self.report.late_s, self.report.reported_late_s):
+            if len(late_s) > MOST_LATE:
+                del late_s[next(iter(late_s))]
+
+    def _pressed(self, packet: Packet) -> None:
+        events = self._keys.take(packet)
+        self._key_answer = encode(self._keys.answer)
+        if self._on_key is not None:
+            for event in events:
+                self._on_key(event)
 
     def _measured(self, part: MeasuredPart) -> None:
         measured = None if self._frames is None else self._frames.take(part)

@@ -26,7 +26,8 @@ __all__ = [
 
 Codes = NDArray[np.int16]
 
-VERSION = 3  # the newest spoken here; a controller and a host speak the newest that both know
+VERSION = 5  # the newest spoken here; a controller and a host speak the newest that both know
+PARAMETRIC, PREFILL = 1, 2  # bits of START's mode
 FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
 
 
@@ -34,7 +35,11 @@ FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
 class StartMessage:
     """A session begins: `total` samples will come (or, `parametric`, tones and biases for as long).
 
-    `note` is for people and recorders (JSON); a controller may pass over it.
+    Attributes
+    ----------
+    total : samples; 0, from version 4 on: open, until END says how many there were.
+    note : for people and recorders (JSON); a controller may pass over it.
+    prefill : from version 4 on, so many samples in store are enough to play; 0: half of the buffer.
     """
 
     session: int
@@ -42,19 +47,28 @@ class StartMessage:
     rate_hz: int
     total: int
     note: bytes = b""
+    prefill: int = 0
 
     _struct: ClassVar = struct.Struct("<IBIQ")
+    _prefill: ClassVar = struct.Struct("<I")
 
     def packet(self, number: int) -> Packet:
         """As bytes."""
-        head = self._struct.pack(self.session, self.parametric, self.rate_hz, self.total)
-        return Packet(Kind.START, number, head + self.note)
+        mode = PARAMETRIC * self.parametric | PREFILL * (self.prefill > 0)
+        head = self._struct.pack(self.session, mode, self.rate_hz, self.total)
+        prefill = self._prefill.pack(self.prefill) if self.prefill else b""
+        return Packet(Kind.START, number, head + prefill + self.note)
 
     @classmethod
-    def of(cls, packet: Packet) -> StartMessage:
-        """From bytes."""
-        session, parametric, rate_hz, total = cls._struct.unpack_from(packet.payload)
-        return cls(session, bool(parametric), rate_hz, total, packet.payload[cls._struct.size :])
+    def of(cls, packet: Packet) -> StartMessage | None:
+        """From bytes; None when it ends before the prefill that it announces."""
+        session, mode, rate_hz, total = cls._struct.unpack_from(packet.payload)
+        rest, prefill = packet.payload[cls._struct.size :], 0
+        if mode & PREFILL:
+            if len(rest) < cls._prefill.size:
+                return None
+            (prefill,), rest = cls._prefill.unpack_from(rest), rest[cls._prefill.size :]
+        return cls(session, bool(mode & PARAMETRIC), rate_hz, total, rest, prefill)
 
 
 @dataclass(frozen=True)

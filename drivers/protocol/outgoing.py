@@ -6,13 +6,14 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..channels import Channel, Role
+from ..channels import Channel, Role, channels_of
 from ..errors import DriverError
 from ..formats.samples import SampleReader
 from ..waveform.coupling import CouplingEvent
@@ -23,15 +24,16 @@ from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Mark, SamplesMess
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
-from .replies import Capabilities
+from .replies import OPEN_SINCE, Capabilities
 
 __all__ = [
-    "Coder", "End", "Message", "UnfitController", "check_fit", "fitting", "link_message", "measures",
-    "session_messages",
+    "MARK_FIXED", "Coder", "End", "Message", "UnfitController", "block_of", "check_fit", "check_fit_for", "fitting",
+    "link_coupling", "links_of", "marks_of", "measures", "session_messages", "start_of",
 ]  # fmt: skip
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
+START_FIXED, PREFILL_FIXED, MARK_FIXED = 17, 4, 12  # bytes before the notes of START and MARK
 
 
 class UnfitController(DriverError, ValueError):
@@ -55,16 +57,20 @@ class End:
 Message = StartMessage | Event | SamplesMessage | End
 
 
-def check_fit(manifest: Manifest, found: Capabilities) -> None:
-    """Compare what the waveform needs with what the controller is.
+def check_fit(manifest: Manifest, found: Capabilities, *, parametric: bool = False) -> None:
+    """Compare what the waveform needs with what the controller is; `parametric`: it needs no room for samples.
 
     Raises
     ------
     UnfitController
         With the first thing that differs.
     """
-    device = manifest.device
     lam_max = max((max(event.lam, default=0.0) for event in manifest.coupling), default=0.0)
+    check_fit_for(manifest.device, found, lam_max, parametric=parametric)
+
+
+def check_fit_for(device: Device, found: Capabilities, lam_max: float, *, parametric: bool = False) -> None:
+    """The same for any waveform of `device` whose links go up to `lam_max`."""
     if not 1 <= found.version <= VERSION:
         raise UnfitController(
             f"controller {found.name!r}: it speaks protocol version {found.version}, dotwave {VERSION} and older; "
@@ -73,8 +79,8 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
     for name, wanted, have in (
         ("rows", device.rows, found.rows),
         ("columns", device.cols, found.cols),
-        ("channels", len(manifest.channels), found.channels),
-        ("samples per second", manifest.rate_hz, found.rate_hz),
+        ("channels", len(channels_of(device)), found.channels),
+        ("samples per second", device.amplifier.rate_hz, found.rate_hz),
         ("bits per sample", 16, found.bits),
     ):
         if wanted != have:
@@ -88,6 +94,10 @@ def check_fit(manifest: Manifest, found: Capabilities) -> None:
         )
     if lam_max > 0 and not (found.lam_step > 0 and lam_max <= found.lam_max * (1 + 1e-6)):
         raise UnfitController(f"controller {found.name!r}: its lam ends at {found.lam_max:g}, {lam_max:g} is needed")
+    if parametric:
+        return
+    if not found.buffer_samples:
+        raise UnfitController(f"controller {found.name!r}: it has no room for samples; play with --parametric")
     if SamplesMessage.most(found.channels, found.max_payload) < 1:
         raise UnfitController(f"controller {found.name!r}: one sample of {found.channels} channels fits no packet")
 
@@ -113,15 +123,13 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(session, False, manifest.rate_hz, manifest.samples, fitting(scene_note(manifest), found, 17))
-    # Events go by time; in the manifest they do so within each row only.
-    links = (
-        link_message(event, manifest.rate_hz, found) for event in sorted(manifest.coupling, key=lambda event: event.t_s)
+    yield start_of(session, found, manifest.samples, scene_note(manifest))
+    waiting = merge(
+        links_of(manifest, found), marks_of(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )
-    waiting = merge(links, _marks(manifest, found), _measures(manifest, found), key=lambda event: event.at)
     event = next(waiting, None)
-    coder, first = Coder(manifest.channels, manifest.rate_hz, found), 0
-    for volts in reader.blocks(coder.block):
+    coder, first = Coder(manifest.channels, found.full_volts), 0
+    for volts in reader.blocks(block_of(found)):
         while event is not None and event.at < first + len(volts):
             yield event
             event = next(waiting, None)
@@ -130,72 +138,104 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
     yield End(first)
 
 
-class Coder:
-    """Volts as the codes of a controller: constant ones the nearest, of drives with the error pushed up in frequency.
+def start_of(session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0) -> StartMessage:
+    """START, its note where there is room for it.
 
-    Attributes
+    Parameters
     ----------
-    block : how many samples go into a packet.
+    total : samples; 0 is open.
+    prefill_s : seconds in store that are enough to begin, where the controller knows of that; 0: half of its buffer.
+    """
+    prefill = max(1, round(prefill_s * found.rate_hz)) if prefill_s and found.version >= OPEN_SINCE else 0
+    fixed = START_FIXED + (PREFILL_FIXED if prefill else 0)
+    return StartMessage(session, False, found.rate_hz, total, fitting(note, found, fixed), prefill)
+
+
+def block_of(found: Capabilities) -> int:
+    """How many samples of all channels go into a packet."""
+    most = SamplesMessage.most(found.channels, found.max_payload)
+    return max(1, min(most, found.buffer_samples // 8, round(PACKET_S * found.rate_hz)))
+
+
+class Coder:
+    """Samples as codes: drives with the error pushed up in frequency, constant voltages the nearest.
+
+    Parameters
+    ----------
+    channels : what each column of a block is.
+    full_volts : volts of code `FULL_CODE`.
     """
 
-    def __init__(self, channels: Sequence[Channel], rate_hz: int, found: Capabilities) -> None:
-        most = SamplesMessage.most(found.channels, found.max_payload)
-        self.block = max(1, min(most, found.buffer_samples // 8, round(PACKET_S * rate_hz)))
+    def __init__(self, channels: Sequence[Channel], full_volts: float) -> None:
         self._drives = [channel.index for channel in channels if channel.role is Role.DRIVE]
-        self._shaper = Shaper(len(self._drives))
-        self._scale = FULL_CODE / found.full_volts
+        self._shaper, self._per_volt = Shaper(len(self._drives)), FULL_CODE / full_volts
 
     def codes(self, volts: NDArray[np.float64]) -> Codes:
-        """The next samples, shape (S, channels), as int16 of that shape."""
-        codes = volts * self._scale
+        """The next samples, float64, shape (S, channels), volts."""
+        codes = volts * self._per_volt
         codes[:, self._drives] = self._shaper.round(codes[:, self._drives].T).T
         return np.rint(codes).clip(-FULL_CODE, FULL_CODE).astype(np.int16)
 
 
-def link_message(event: CouplingEvent, rate_hz: int, found: Capabilities) -> LinkCoupling:
-    """Links that begin to move, in samples and the controller's steps."""
-    at = round(event.t_s * rate_hz)
-    ramp = max(0, round((event.t_s + event.ramp_s) * rate_hz) - at)
+def links_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+    """What moves the links, by time."""
+    # Events go by time; in the manifest they do so within each row only.
+    for event in sorted(manifest.coupling, key=lambda event: event.t_s):
+        yield link_coupling(event, found)
+
+
+def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling:
+    """Links that move, as a controller is told of them."""
+    at = round(event.t_s * found.rate_hz)
+    ramp = max(0, round((event.t_s + event.ramp_s) * found.rate_hz) - at)
     step = found.lam_step or 1.0
     return LinkCoupling(at, event.row, ramp, tuple(min(65535, round(lam / step)) for lam in event.lam))
 
 
-def _marks(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+def marks_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
+    """A mark for each frame."""
     for number, mark in enumerate(manifest.frames):
-        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, 12))
+        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, MARK_FIXED))
 
 
 def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     for number, mark in enumerate(manifest.frames):
-        window = round((mark.settled_s + mark.end_s) / 2 * manifest.rate_hz), round(mark.end_s * manifest.rate_hz)
-        yield from measures(manifest.device, number, window, mark.omega.tolist(), mark.moving, found)
+        yield from measures(manifest.device, number, mark, mark.omega.tolist(), mark.moving, found)
+
+
+class _Stands(Protocol):
+    """A frame, planned or written: when its pattern stands, in seconds."""
+
+    @property
+    def settled_s(self) -> float: ...
+
+    @property
+    def end_s(self) -> float: ...
 
 
 def measures(
-    device: Device,
-    frame: int,
-    window: tuple[int, int],
-    omega: Sequence[float],
-    moving: Sequence[bool],
-    found: Capabilities,
+    device: Device, number: int, frame: _Stands, omega: Sequence[float], moving: Sequence[bool], found: Capabilities
 ) -> Iterator[Measure]:
-    """What is asked of a controller that measures while a frame goes out: nothing where it does not fit into a packet.
+    """A window for a frame, where the controller measures: the second half of the time its pattern stands.
+
+    What is left there of the way in, where actuators are not as planned, has had the first half to fade. Nothing is
+    asked for where it does not fit into a packet.
 
     Parameters
     ----------
-    window : first sample, and that after the last. Take the second half of the time its pattern stands: what is left of
-        the way in, where actuators are not as planned, has had the first half to fade.
+    number : of the frame, from 0.
     omega, moving : of each row.
     """
-    at, stop = window
+    rate = device.amplifier.rate_hz
+    at, stop = round((frame.settled_s + frame.end_s) / 2 * rate), round(frame.end_s * rate)
     # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
     others = max(omega) if device.bias == "none" else 0.0
     asked = [one if moves else others for one, moves in zip(omega, moving, strict=True)]
-    turns = [turns_of(one, device.tau_per_s / device.amplifier.rate_hz) if one else 0 for one in asked]
+    turns = [turns_of(one, device.tau_per_s / rate) if one else 0 for one in asked]
     while len(turns) > 1 and turns[-1] == turns[-2]:
         turns.pop()
     if found.measures and stop > at and len(turns) <= Measure.most(found.max_payload):
-        yield Measure(at, stop - at, frame, tuple(turns))
+        yield Measure(at, stop - at, number, tuple(turns))
 
 
 def fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:

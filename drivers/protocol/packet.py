@@ -37,6 +37,7 @@ class Kind(IntEnum):
     STATUS = 0x02
     HEARTBEAT = 0x03
     STOP = 0x04
+    KEYED = 0x05
     START = 0x10
     COUPLING = 0x11
     BIAS = 0x12
@@ -45,14 +46,16 @@ class Kind(IntEnum):
     SAMPLES = 0x15
     END = 0x16
     MEASURE = 0x17
+    ENVELOPE = 0x18
     CAPABILITIES = 0x81
     ACK = 0x82
     MARKED = 0x83
     REFUSED = 0x84
     MEASURED = 0x85
+    KEY = 0x86
 
 
-ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.MEASURE)
+ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.ENVELOPE)
 
 
 class Shape(NamedTuple):
@@ -67,6 +70,7 @@ SHAPES = {
     Kind.STATUS: Shape(0, 0),
     Kind.HEARTBEAT: Shape(0, 0),
     Kind.STOP: Shape(0, 0),
+    Kind.KEYED: Shape(4, 0),
     Kind.START: Shape(17, 1),
     Kind.COUPLING: Shape(14, 2),
     Kind.BIAS: Shape(18, 0),
@@ -75,11 +79,13 @@ SHAPES = {
     Kind.SAMPLES: Shape(10, 2),
     Kind.END: Shape(8, 0),
     Kind.MEASURE: Shape(16, 8),
+    Kind.ENVELOPE: Shape(22, 8),
     Kind.CAPABILITIES: Shape(45, 1),
     Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),
     Kind.REFUSED: Shape(4, 1),
     Kind.MEASURED: Shape(10, 24),
+    Kind.KEY: Shape(4, 2),
 }
 
 

@@ -14,6 +14,7 @@ from chainsim import Device
 
 from ..channels import channels_of
 from .early import MOST_EARLY
+from .envelope import Envelope, EnvelopeMix
 from .measured import Measure
 from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Tones
 from .replies import Marked, State
@@ -22,7 +23,7 @@ from .synthesis import Glide, ToneMix
 __all__ = ["BUFFER_S", "ControllerSpec", "Event", "OutputBlock", "Playout"]
 
 Floats = NDArray[np.float64]
-Event = LinkCoupling | Bias | Tones | Mark | Measure
+Event = LinkCoupling | Bias | Tones | Envelope | Mark | Measure
 
 BLOCK = 256
 BUFFER_S = 2.0  # what a host on a busy machine needs; see PROTOCOL.md
@@ -124,6 +125,7 @@ class Playout:
         self._fade = np.linspace(1.0, 0.0, max(1, round(spec.ramp_s * spec.rate_hz)) + 1)[1:]
         self._frozen: Floats = np.zeros(spec.channels)
         self._faded = len(self._fade)
+        self._last: Floats = np.zeros(spec.channels)
         self._lam = [Glide.still(np.zeros(spec.cols - 1)) for _ in range(spec.rows)]
         self.state = State.IDLE
         self.played = 0
@@ -139,18 +141,21 @@ class Playout:
         self._events: deque[Event] = deque()
         self._bias = [Glide.still(np.zeros(1)) for _ in range(self._spec.channels)]
         self._tones = [ToneMix() for _ in range(self._spec.channels)]
+        self._envelopes = [EnvelopeMix() for _ in range(self._spec.channels)]
         self._gain = len(self._fade)  # how far the ramp back up is
-        self._total: int | None = None
+        self._total = 0
         self._ended = False
         self.parametric = False
+        self._enough = self._spec.buffer_samples / 2
         self.received = self.played = self.events_done = self.underruns = 0
         self.held_s = 0.0
 
-    def begin(self, parametric: bool) -> None:
-        """A stream is to come; every link goes to 0."""
+    def begin(self, parametric: bool, total: int, prefill: int = 0) -> None:
+        """A stream is to come, of which `prefill` samples are enough to play (0: half a buffer); links go to 0."""
         self.clear()
+        self._enough = min(self._enough, prefill or self._enough)
         self._lam = [Glide.still(np.zeros(self._spec.cols - 1)) for _ in self._lam]
-        self.parametric = parametric
+        self.parametric, self._total = parametric, total
         self.state = State.FILLING
 
     def push(self, codes: Codes) -> None:
@@ -185,8 +190,8 @@ class Playout:
         if self.state not in (State.FILLING, State.HELD) or not self.silent or not self.alive:
             return
         stored = self.received - self.played
-        half = 2 * stored >= self._spec.buffer_samples or 2 * len(self._events) >= self._spec.event_slots
-        if self._ended or half:
+        enough = stored >= self._enough or 2 * len(self._events) >= self._spec.event_slots
+        if self._ended or enough:
             self.state = State.PLAYING
 
     def hold(self, state: State = State.HELD) -> None:
@@ -212,7 +217,8 @@ class Playout:
                 self._put_out(self._next(count), np.arange(self.played, self.played + count), live=True)
                 self.played += count
             else:
-                count = min(due, BLOCK)
+                # A block ends with the ramp, for after it the output may go on.
+                count = min(due, BLOCK, len(self._fade) - self._faded or BLOCK)
                 if self.state is State.HELD and self.played:
                     self.held_s += count / self._spec.true_rate_hz
                 self._put_out(self._fading(count), np.full(count, self.played), live=False)
@@ -230,7 +236,7 @@ class Playout:
 
     def _available(self) -> int:
         if self.parametric:
-            return (self._total or 0) - self.played if self._ended else BLOCK
+            return max(0, self._total - self.played) if self._total else BLOCK
         return self.received - self.played
 
     def _until_event(self) -> int:
@@ -250,6 +256,8 @@ class Playout:
                 self._bias[event.channel] = self._bias[event.channel].then(event.at, event.ramp, [event.volts])
             elif isinstance(event, Tones):
                 self._tones[event.channel].change(event.at, event.ramp, event.tones)
+            elif isinstance(event, Envelope):
+                self._envelopes[event.channel].change(event)
 
     def _next(self, count: int) -> Floats:
         index = np.arange(self.played, self.played + count)
@@ -261,6 +269,8 @@ class Playout:
                 volts[:, channel] += bias.at(index)[:, 0]
             if tones.any:
                 volts[:, channel] += tones.at(index, self._spec.rate_hz)
+            if self._envelopes[channel].any:
+                volts[:, channel] += self._envelopes[channel].at(index)
         if self._gain < len(self._fade):
             climb = np.arange(self._gain, self._gain + count).clip(max=len(self._fade)) / len(self._fade)
             volts *= climb[:, np.newaxis]

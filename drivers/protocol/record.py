@@ -13,18 +13,16 @@ from typing import Any
 import numpy as np
 
 from chainsim import Device
-from planner import FramePlan
 
 from ..channels import channels_of
 from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
 from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
-from ..waveform.marking import mark_of
 from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
-__all__ = ["ArrivalRecorder", "CutShort", "frame_note", "plan_note", "scene_note"]
+__all__ = ["ArrivalRecorder", "CutShort", "device_note", "frame_note", "live_note", "plan_note", "scene_note"]
 
 MOST_NOTE_BYTES = 1 << 20
 # What a manifest has of a frame, and a note has no room for.
@@ -33,12 +31,12 @@ NOT_NOTED = ("tones", "phase", "spread")
 
 def scene_note(manifest: Manifest) -> bytes:
     """What START tells a recorder: how to read the frames as text."""
-    return _packed({"device": manifest.device.name, "encoding": dict(manifest.encoding)})
+    return device_note(manifest.device, manifest.encoding)
 
 
-def plan_note(device: Device, frame: FramePlan, number: int) -> bytes:
-    """The same as `frame_note` of a frame that is not in a manifest yet."""
-    return _packed({key: value for key, value in mark_of(device, frame, number).items() if key not in NOT_NOTED})
+def plan_note(entry: Mapping[str, Any]) -> bytes:
+    """The same as `frame_note`, of what stands in a manifest of a frame (`frame_entry`)."""
+    return _packed({key: value for key, value in entry.items() if key not in NOT_NOTED})
 
 
 def frame_note(mark: FrameMark) -> bytes:
@@ -52,8 +50,22 @@ def frame_note(mark: FrameMark) -> bytes:
             "span": list(mark.span),
             **({} if mark.wish.contrast_db is None else {"contrast_db": mark.wish.contrast_db}),
             **({"goes_on": [asdict(one) for one in mark.goes_on]} if mark.goes_on else {}),
+            **({} if mark.number is None else {"number": asdict(mark.number)}),
         }
     )  # fmt: skip
+
+
+def live_note(entry: Mapping[str, Any] | None, start_s: float) -> bytes:
+    """What MARK tells a recorder of a pattern that stands until the next mark: the frame as a manifest has it.
+
+    `entry` is None for the way to rest, which ends the frame before it and is none itself.
+    """
+    return _packed({**(entry or {}), "start_s": start_s, "end_s": None})
+
+
+def device_note(device: Device, encoding: Mapping[str, Any]) -> bytes:
+    """What START tells a recorder, where nobody knows yet what is going to be shown."""
+    return _packed({"device": device.name, "encoding": dict(encoding)})
 
 
 def _packed(value: Mapping[str, Any]) -> bytes:
@@ -83,9 +95,10 @@ class ArrivalRecorder:
 
     A sample is code / 32767 of the channel's volts per unit; float32 gives every code back exactly. Events
     stand at their samples. Frames come from the notes of the marks; a mark without a note has no frame in the
-    record. The files appear when the session's END arrives, or when it is cut short: then they hold the samples that
-    arrived and the frames that stood in them, and the manifest says ``"complete": false``. A new session writes them
-    anew; one of which no sample arrived leaves them as they are.
+    record, and a frame without an end ends at the next mark with a note, or with the session. The files appear when the
+    session's END arrives, or when it is cut short: then they hold the samples that arrived and the frames that stood in
+    them, and the manifest says ``"complete": false``. A new session writes them anew; one of which no sample arrived
+    leaves them as they are.
 
     Attributes
     ----------
@@ -144,11 +157,13 @@ class ArrivalRecorder:
             times = {"t_s": event.at / rate, "ramp_s": event.ramp / rate}
             self._coupling.append({"row": event.row, "lam": lam, **times})
         elif isinstance(event, Mark) and (frame := _unpacked(event.note)):
+            self._close_frame(event.at / rate)
             self._frames.append(frame)
 
     def end(self) -> None:
         """The session is complete: put the files in place."""
         self._under_way, self.cut_short = False, None
+        self._close_frame(self._writer.samples / self._device.amplifier.rate_hz)
         self._write(self._frames, {})
         self.finished += 1
 
@@ -160,10 +175,19 @@ class ArrivalRecorder:
         self._under_way = False
         self.cut_short = CutShort(self._writer.samples / rate, self._total / rate)
         if self._writer.samples:
+            self._close_frame(self.cut_short.arrived_s)
             stood = (_stood(frame, self.cut_short.arrived_s, self._device) for frame in self._frames)
             self._write([frame for frame in stood if frame is not None], {"complete": False})
         else:
             self._drop()
+
+    def _close_frame(self, end_s: float) -> None:
+        """The frame whose end was left open ends here; one that never stood was none."""
+        if not self._frames or self._frames[-1].get("end_s", 0.0) is not None:
+            return
+        frame = _stood(self._frames.pop() | {"end_s": end_s}, end_s, self._device)
+        if frame is not None:
+            self._frames.append(frame)
 
     def _write(self, frames: list[dict[str, Any]], more: Mapping[str, Any]) -> None:
         with self._stack:

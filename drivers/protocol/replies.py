@@ -14,6 +14,7 @@ __all__ = ["Ack", "Capabilities", "Flag", "Marked", "Refused", "State"]
 
 ABILITIES_SINCE = 3  # the version from which on CAPABILITIES has a byte of flags before the name
 MEASURES = 1  # its bit
+OPEN_SINCE = 4  # the version from which on sessions may be open and start early
 
 
 class State(IntEnum):

@@ -12,6 +12,8 @@ from functools import partial
 from typing import Protocol
 
 from .early import EarlyPackets
+from .envelope import LONGEST_PIECE, Envelope
+from .keys import KeyEvent, KeyWaiting
 from .measured import Measure, parts_of
 from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
 from .metering import Meter, Senses
@@ -22,6 +24,7 @@ from .replies import Ack, Capabilities, Flag, Refused, State
 __all__ = ["Recorder", "VirtualController"]
 
 ACK_EVERY_S = 0.02
+KEYS_SINCE = 4  # the version from which on a host is told of keys
 
 
 class Recorder(Protocol):
@@ -80,6 +83,7 @@ class VirtualController:
         self._recorder = recorder
         self._reader = PacketReader()
         self._early = EarlyPackets(spec.early_packets)
+        self._keys = KeyWaiting()
         self._version = 1
         self._next = 0
         self._events = 0
@@ -115,8 +119,15 @@ class VirtualController:
         if self.session and now - self._ack_at >= ACK_EVERY_S:
             self._ack_due = True
 
+    def press(self, key: KeyEvent) -> None:
+        """A key beside the grid went down or up; a host that knows of keys is told until it has it."""
+        if self._version >= KEYS_SINCE:
+            self._keys.press(key, self._now)
+
     def outgoing(self) -> bytes:
         """The bytes to send to the host, once."""
+        if (keys := self._keys.due(self._now)) is not None:
+            self._send(keys)
         if self._ack_due:
             self._send(self._ack().packet())
             self._ack_due = self._gap = False
@@ -146,12 +157,15 @@ class VirtualController:
         if packet.kind is Kind.HELLO:
             # A host that has not greeted, or only knows version 1, gets the ACK of version 1.
             self._version = max(1, min(VERSION, int.from_bytes(packet.payload, "little")))
+            self._keys.clear()
             self._send(self._capabilities().packet())
         elif packet.kind is Kind.STOP:
             self.playout.hold(State.STOPPED)
             self.playout.clear()
             self._forget()
             self.session, self._ack_due = 0, True
+        elif packet.kind is Kind.KEYED:
+            self._keys.answered(packet)
         elif packet.kind in (Kind.STATUS, Kind.HEARTBEAT):
             self._ack_due = True
         elif packet.kind in ORDERED:
@@ -161,7 +175,7 @@ class VirtualController:
     def _take_ordered(self, packet: Packet) -> None:
         if packet.kind is Kind.START:
             start = StartMessage.of(packet)
-            if packet.number != 0 or start.session in (0, self.session):
+            if start is None or packet.number != 0 or start.session in (0, self.session):
                 return
             self._try(packet.number, lambda: self._start(start))
         elif not self.session or packet.number > self._next:
@@ -187,7 +201,7 @@ class VirtualController:
     def _start(self, start: StartMessage) -> None:
         if start.rate_hz != self.spec.rate_hz:
             raise _Refusal(f"the rate is {self.spec.rate_hz} Hz, not {start.rate_hz}")
-        self.playout.begin(start.parametric)
+        self.playout.begin(start.parametric, start.total, start.prefill)
         self._forget()
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
@@ -242,7 +256,11 @@ class VirtualController:
         if isinstance(event, LinkCoupling):
             fits = event.row < spec.rows and len(event.codes) == spec.cols - 1
             if not fits or max(event.codes, default=0) * spec.lam_step > spec.lam_max * (1 + 1e-6):
-                raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most {spec.lam_max}")
+                raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most lam_max")
+        elif isinstance(event, Envelope):
+            if event.channel >= spec.channels or not event.fits(spec.full_volts):
+                pieces = f"1 point or 4 over 1 to {LONGEST_PIECE} samples"
+                raise _Refusal(f"envelope: channels 0..{spec.channels - 1}, {pieces}, at most full_volts")
         elif isinstance(event, Measure):
             if self._meter is None or not event.samples or not 1 <= len(event.turns) <= spec.rows:
                 why = f"at least 1 sample and phases of 1 to {spec.rows} rows"
@@ -252,11 +270,12 @@ class VirtualController:
             rest = [] if isinstance(event, Bias) else [n for tone in event.tones for n in (tone.hz, tone.phase)]
             fits = event.channel < spec.channels and all(map(math.isfinite, (*volts, *rest)))
             if not fits or sum(map(abs, volts)) > spec.full_volts:
-                raise _Refusal(f"channels 0..{spec.channels - 1}, at most {spec.full_volts:g} V in all")
+                raise _Refusal(f"channels 0..{spec.channels - 1}, at most full_volts in all")
 
     def _end(self, total: int) -> None:
-        if total != self._total or (not self.playout.parametric and total != self.playout.received):
-            raise _Refusal(f"the end at sample {total}, where {self.playout.received} of {self._total} are here")
+        announced = self._total or total
+        if total != announced or (not self.playout.parametric and total != self.playout.received):
+            raise _Refusal(f"the end at sample {total}, where {self.playout.received} of {announced} are here")
         self.playout.end(total)
         if self._recorder is not None:
             self._recorder.end()
@@ -293,5 +312,6 @@ def _event(packet: Packet) -> Event:
         Kind.TONES: Tones,
         Kind.MARK: Mark,
         Kind.MEASURE: Measure,
+        Kind.ENVELOPE: Envelope,
     }
     return kinds[packet.kind].of(packet)

@@ -12,6 +12,7 @@ from planner import FramePlan, Measured
 from ..formats.samples import SampleReader
 from ..protocol.host_session import HostSession, StreamReport, Timing
 from ..protocol.outgoing import Message, session_messages
+from ..protocol.parametric import ENVELOPES_SINCE, NotParametric, ParametricSession
 from ..protocol.plan_messages import plan_messages
 from ..protocol.playout import BUFFER_S
 from ..protocol.replies import Capabilities
@@ -36,6 +37,7 @@ class Controller:
     port : such as /dev/ttyACM0.
     baud : bits per second, None: the controller's own.
     patience_s : how long to wait for a controller that is not heard.
+    parametric : send what the controller draws itself in place of samples, where waveform and controller allow it.
     on_measured : gets what the controller measured of each frame, where it does.
     frames : what is played in place of the samples, each frame drawn shortly before it goes out: a plan as long as they
         are, for the same device, that is corrected meanwhile. Every sample of it is held against `limits`.
@@ -45,6 +47,7 @@ class Controller:
     port: str
     baud: int | None = None
     patience_s: float = 10.0
+    parametric: bool = False
     on_measured: Callable[[Measured], None] | None = None
     frames: Iterable[FramePlan] | None = None
     limits: GateLimits | None = None
@@ -64,33 +67,66 @@ class Controller:
         if not self.port:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
+        drawn = self.parametric and self.frames is None
+        way = _Way.of(manifest, samples) if drawn else _Way(manifest, samples)
         session = HostSession(
-            lambda found: self._messages(manifest, samples, found, number), session=number,
+            lambda found: self._messages(way, found, number), session=number,
             timing=Timing() if self.frames is None else Timing(lead_s=LEAD_S), on_measured=self.on_measured,
         )  # fmt: skip
         run_session(session, self._line, patience_s=self.patience_s, progress=progress)
         stream = session.report
-        rounding = f"off by at most {1e3 * manifest.device.amplifier.volts / 65534:.2f} mV"
         return SinkReport(
             ok=stream.underruns == 0 and stream.lost_s == 0,
             facts={"stream": _plain(stream)},
             lines=_lines(stream),
-            notes=(f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream)),
+            notes=way.notes(stream),
         )
 
-    def _messages(
-        self, manifest: Manifest, samples: SampleReader, found: Capabilities, session: int
-    ) -> Iterator[Message]:
+    def _messages(self, way: _Way, found: Capabilities, session: int) -> Iterator[Message]:
         if self.frames is None:
-            return session_messages(manifest, samples, found, session=session)
-        limits = self.limits or GateLimits.of(manifest.device, len(manifest.channels))
-        return plan_messages(manifest, self.frames, found, session=session, limits=limits)
+            return way.messages(found, session)
+        limits = self.limits or GateLimits.of(way.manifest.device, len(way.manifest.channels))
+        return plan_messages(way.manifest, self.frames, found, session=session, prefill_s=LEAD_S / 2, limits=limits)
 
     def close(self) -> None:
         """Nothing stays open after `play`."""
 
     def _line(self) -> Uart:
         return Uart(self.port) if self.baud is None else Uart(self.port, self.baud)
+
+
+@dataclass
+class _Way:
+    """How a waveform goes to a controller: as samples, or drawn by it; `why` it is not drawn though asked for."""
+
+    manifest: Manifest
+    samples: SampleReader
+    drawn: ParametricSession | None = None
+    why: str = ""
+
+    @classmethod
+    def of(cls, manifest: Manifest, samples: SampleReader) -> _Way:
+        """Drawn, if that can be."""
+        try:
+            return cls(manifest, samples, ParametricSession.of(manifest, samples))
+        except NotParametric as refusal:
+            return cls(manifest, samples, why=str(refusal))
+
+    def messages(self, found: Capabilities, session: int) -> Iterator[Message]:
+        """The session for the controller that answers."""
+        if self.drawn is not None and found.version < ENVELOPES_SINCE:
+            self.drawn, self.why = None, f"controller {found.name!r} knows no envelopes; update its firmware"
+        if self.drawn is not None:
+            return self.drawn.messages(found, session=session)
+        return session_messages(self.manifest, self.samples, found, session=session)
+
+    def notes(self, stream: StreamReport) -> tuple[str, ...]:
+        """What to know of it."""
+        if self.drawn is not None:
+            return (f"The controller drew it from {len(self.drawn.envelopes)} envelopes; no samples were sent.",)
+        rounding = f"off by at most {1e3 * self.manifest.device.amplifier.volts / 65534:.2f} mV"
+        streamed = (f"It was streamed: {self.why}.",) if self.why else ()
+        return (*streamed, f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream))
 
 
 def buffer_notes(stream: StreamReport) -> tuple[str, ...]:

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Device, Outcome
-from encoders import GoesOn
+from encoders import GoesOn, PageNumber
 from planner import FramePlan, FrameWish
 
 from ..channels import Channel, channels_of
 from ..errors import UnreadableWaveform, WaveformError
 from ..files.whole import naming
 from .coupling import CouplingEvent, CouplingWriter, LamTrack
-from .marking import mark_of
+from .frame_entry import frame_entry
 
 __all__ = [
     "MOST_BYTES", "SCHEMA", "FrameMark", "HeadingMark", "Manifest", "ManifestWriter", "digest_of", "digest_of_open",
@@ -59,7 +59,7 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
-    goes_on : where words of the page go on, and which cells are not of the word there.
+    goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     """
 
     start_s: float
@@ -77,6 +77,7 @@ class FrameMark:
     moving: tuple[bool, ...]
     wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
+    number: PageNumber | None = None
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,7 @@ class ManifestWriter:
             for event in self._coupling.events(frame):
                 self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
             if frame.frame is not None:
-                self._marks.add(mark_of(self._device, frame, self.frames))
+                self._marks.add(frame_entry(self._device, frame, self.frames))
                 for heading in frame.frame.headings:
                     place = {"frame": self.frames, "page": frame.frame.page, "start_s": frame.start_s}
                     self._headings.add({"level": heading.level, "text": heading.text} | place)

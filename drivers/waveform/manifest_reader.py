@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from chainsim import Device, Outcome, complaint_of, shown, words_of
-from encoders import GoesOn
+from encoders import GoesOn, PageNumber
 from planner import FrameWish
 
 from ..channels import Channel, Role
@@ -64,6 +64,11 @@ class _GoesOn(_Part):
     left_out: Words = ""
 
 
+class _PageNumber(_Part):
+    at: Index
+    cells: Annotated[Words, Field(min_length=1)]
+
+
 class _Frame(_Part):
     start_s: Seconds
     settled_s: Seconds
@@ -81,6 +86,7 @@ class _Frame(_Part):
     phase: list[list[Finite | None]] | None = None
     moving: list[bool] | None = None
     goes_on: list[_GoesOn] = []
+    number: _PageNumber | None = None
 
 
 class _Heading(_Part):
@@ -263,6 +269,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         moving=_moving(frame, device),
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
+        number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
     )
 
 

@@ -14,9 +14,9 @@ from planner import DriveTone, FirstOrderHold, FramePlan, OperatingPoint, Plan, 
 
 from ..channels import Channel, Role, channels_of
 from .shaping import Shaper
-from .timeline import PlacedFrame, stretches
+from .timeline import stretches
 
-__all__ = ["Waveform"]
+__all__ = ["Converter", "Waveform", "volts_of"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -122,42 +122,62 @@ class Waveform:
         # Chunks are cut at the same samples for every block size, so that vector instructions meet the same
         # numbers at the same places and round them in the same way.
         size = max(256, CHUNK_VALUES // len(self.channels))
-        drives = sum(channel.role is Role.DRIVE for channel in self.channels)
-        step, shaper = self.device.amplifier.volt_step, Shaper(drives)
+        converter = Converter(self.device)
         for stretch in stretches(self.device, self.frames):
             for first in range(stretch.first, stretch.stop, size):
-                chunk = self._chunk(stretch, np.arange(first, min(first + size, stretch.stop)))
-                if step:
-                    chunk /= step
-                    chunk[:drives] = shaper.round(chunk[:drives])
-                    np.rint(chunk[drives:], out=chunk[drives:])
-                    chunk *= step
-                yield chunk
+                index = np.arange(first, min(first + size, stretch.stop))
+                yield converter.round(volts_of(self.device, stretch.plan, index))
 
-    def _chunk(self, stretch: PlacedFrame, index: NDArray[np.intp]) -> Floats:
-        frame, device = stretch.plan, self.device
-        time_s = index / self.rate_hz
-        since_s = time_s - frame.start_s
-        out = np.zeros((len(self.channels), len(index)))
-        carriers: dict[float, _Carrier] = {}
-        equal: dict[tuple[int, int], int] = {}
-        for number, (state, ramp) in enumerate(zip(frame.states, frame.ramps, strict=True)):
-            # Equal rows come from the planner's cache as the same objects: sampled once, then copied.
-            first = equal.setdefault((id(state), id(ramp)), number)
-            if first < number:
-                out[number] = out[first]
-            else:
-                for tone in tones_of(state, ramp):
-                    if tone.omega not in carriers:
-                        carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
-                    _drive(tone, since_s, carriers[tone.omega], out[number])
-        drives = out[: len(frame.states)]
-        drives /= device.epsilon_per_volt
-        if device.bias == "actuator":
-            biases = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
-            for state, ramp, rows in zip(frame.states, frame.ramps, biases, strict=True):
-                _bias(state, ramp, since_s, device.bias_per_volt, rows)
-        return out
+
+class Converter:
+    """The steps of a device's converter, where it has any; drives are rounded with the error pushed up in frequency."""
+
+    def __init__(self, device: Device) -> None:
+        self._step = device.amplifier.volt_step
+        self._drives = sum(channel.role is Role.DRIVE for channel in channels_of(device))
+        self._shaper = Shaper(self._drives)
+
+    def round(self, volts: Floats) -> Floats:
+        """The next samples as they go out, in place; float64, shape (channels, S), volts."""
+        if self._step:
+            drives = self._drives
+            volts /= self._step
+            volts[:drives] = self._shaper.round(volts[:drives])
+            np.rint(volts[drives:], out=volts[drives:])
+            volts *= self._step
+        return volts
+
+
+def volts_of(device: Device, frame: FramePlan, index: NDArray[np.intp]) -> Floats:
+    """What a frame asks of the channels at samples `index` of the whole plan, none before its start, rising.
+
+    Returns
+    -------
+    float64, shape (channels, S), volts.
+    """
+    time_s = index / device.amplifier.rate_hz
+    since_s = time_s - frame.start_s
+    biases = device.rows * device.cols if device.bias == "actuator" else 0
+    out = np.zeros((len(frame.states) + biases, len(index)))
+    carriers: dict[float, _Carrier] = {}
+    equal: dict[tuple[int, int], int] = {}
+    for number, (state, ramp) in enumerate(zip(frame.states, frame.ramps, strict=True)):
+        # Equal rows come from the planner's cache as the same objects: sampled once, then copied.
+        first = equal.setdefault((id(state), id(ramp)), number)
+        if first < number:
+            out[number] = out[first]
+        else:
+            for tone in tones_of(state, ramp):
+                if tone.omega not in carriers:
+                    carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
+                _drive(tone, since_s, carriers[tone.omega], out[number])
+    drives = out[: len(frame.states)]
+    drives /= device.epsilon_per_volt
+    if biases:
+        stills = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
+        for state, ramp, rows in zip(frame.states, frame.ramps, stills, strict=True):
+            _bias(state, ramp, since_s, device.bias_per_volt, rows)
+    return out
 
 
 @dataclass(frozen=True)

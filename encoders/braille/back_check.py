@@ -12,18 +12,19 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import islice
 from typing import Any, NamedTuple
 
 from ..choices import Undefined
 from ..errors import TableMissing
-from ..scene import GoesOn
+from ..scene import GoesOn, PageNumber
 from . import louis_binding
 from .alphabet import alphabet
 from .dots import BLANK, LOWER_SIX
 from .joining import Emphases, join_pages, unmarked
 from .readers.sources import SourceKind, TextSource
 from .report import KEPT, ReportLog
-from .transcribe import Transcriber
+from .transcribe import PARAGRAPH_END, Transcriber, paragraphs
 from .translation import translate
 from .undefined import writable
 
@@ -32,6 +33,9 @@ __all__ = ["BackCheck", "Difference", "FeltPage", "back_check", "back_translate"
 PIECE = 2000
 """Cells back-translated at once; more only up to the next blank, as a sign may have several cells."""
 LONGEST_WORD = 100_000
+LONGEST_REST = 200
+MOST_FOLLOWING = 64
+"""Characters, and pages, looked at of what follows a page."""
 REACH = 12
 """Words looked ahead to find where two texts agree again."""
 
@@ -56,12 +60,13 @@ class Difference:
 
 
 class FeltPage(NamedTuple):
-    """Cells of a page as `read_cells` gives them, the source text they show, where words go on, its emphases."""
+    """Cells of a page as `read_cells` gives them, the text they show, where words go on, its emphases, its number."""
 
     cells: str
     text: str = ""
     goes_on: tuple[GoesOn, ...] = ()
     emphases: Emphases = ()
+    number: PageNumber | None = None
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,8 @@ def back_check(
     given = list(pages)
     noted = "continuation" in encoding and not any(isinstance(page, str) for page in given)
     felt = [FeltPage(page) if isinstance(page, str) else page for page in given]
-    joined = join_pages((page.cells for page in felt), encoding, (page.goes_on for page in felt) if noted else None)
+    goes_on = [page.goes_on for page in felt] if noted else None
+    joined = join_pages((page.cells for page in felt), encoding, goes_on, (page.number for page in felt))
     reading = _Reading(encoding)
     source = TextSource(text, SourceKind(encoding["kind"]), "text", emphases=tuple(emphases))
     expected = reading.written(source)
@@ -195,8 +201,8 @@ class _Reading:
     def written(self, source: TextSource, log: ReportLog | None = None) -> str:
         """Cells of a source, words parted by one blank."""
         log = log or ReportLog()
-        paragraphs = self.transcriber.paragraphs(source)
-        return _joined_cells(word for a, b in paragraphs for word in self.transcriber.words(source, a, b, log))
+        spans = paragraphs(source.text)
+        return _joined_cells(word for a, b in spans for word in self.transcriber.words(source, a, b, log))
 
     def alone(self, pages: Iterable[FeltPage], encoding: Mapping[str, Any]) -> Iterator[Difference]:
         """Pages that do not say what they show when nothing else is read.
@@ -204,29 +210,72 @@ class _Reading:
         Of words that are whole on their page only digits and capitals are looked at, what indicators of a page before
         could change: the letters of such words are those of the text already if all pages together are.
         """
-        begun = False
-        for number, page in enumerate(pages):
-            text, goes_on = page.text.strip(), bool(page.goes_on)
-            cells = unmarked(page.cells, encoding, page.goes_on)
-            back = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else text
+        given, begun = list(pages), False
+        for number, page in enumerate(given):
+            text = page.text.rstrip()
+            if page.number is not None and not text:
+                continue
+            last = len(page.cells.replace("\n", "")) // int(encoding["run"]) - 1
+            goes_on = any(one.run == last for one in page.goes_on)
+            cells = unmarked(page.cells, encoding, page.goes_on, page.number)
+            found = self._reads_as(cells, text, begun, goes_on, page.emphases) if text else None
             begun = goes_on
-            if back != text:
-                yield Difference(text, back, number)
+            if found and not self._begins(cells, page, goes_on, given[number + 1 :]):
+                yield Difference(*found, number)
 
-    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> str:
-        """`text` when the cells say it, else what they say; `begun` and `goes_on` say which words are parts."""
+    def _begins(self, cells: str, page: FeltPage, goes_on: bool, following: list[FeltPage]) -> bool:
+        """Whether the table writes just these cells for the text of a page where that of the next ones follows.
+
+        An indicator of an address governs it as a whole, and what ends a text may be written otherwise than the same
+        in its middle. Nothing is taken from the pages before: what governs the cells stands on their page.
+        """
+        text = page.text.rstrip()
+        after = "".join(one.text for one in islice(following, MOST_FOLLOWING))[:LONGEST_REST]
+        rest = (after.split() or [""])[0]
+        if not rest or PARAGRAPH_END.search(page.text, len(text)):
+            return False
+        for between in ("",) if goes_on else ("", " "):
+            whole = self.written(TextSource(text + between + rest, SourceKind.TEXT, "page", emphases=page.emphases))
+            if whole.startswith(cells) and (goes_on or whole[len(cells) :].startswith(BLANK)):
+                start = text[list(paragraphs(text))[-1][0] :].lstrip()
+                found = translate(self.tables, start + between + rest)
+                left = len(found.cells) - found.cell_of_text[len(start)]
+                if whole[len(cells) :].startswith(BLANK) or left == len(whole) - len(cells):
+                    return True
+        return False
+
+    def _asked(self, cells: str, text: str, begun: bool, goes_on: bool, emphases: Emphases) -> tuple[str, str] | None:
+        """What of `text` the cells do not say, and what they say; `begun` and `goes_on` say which words are parts."""
         log = ReportLog()
-        written = self.written(TextSource(text, SourceKind.TEXT, "page", emphases=emphases), log)
+        source = TextSource(text, SourceKind.TEXT, "page", emphases=emphases)
+        words = [word for a, b in paragraphs(text) for word in self.transcriber.words(source, a, b, log)]
+        own = _joined_cells(words)
         # The name of a character may be spread over pages that all show the one character.
-        if cells == written or log.undefined_total:
-            return text
-        words = cells.split(BLANK)
-        parts = (not begun or written.startswith(words[0])) and (not goes_on or written.endswith(words[-1]))
-        if parts and not _indicated(text):
-            return text
-        back, likely = back_translate(self.tables, cells), back_translate(self.tables, written)
-        look: Callable[[str], str] = _indicated if parts else _letters
-        return text if look(back) in (look(text), look(likely)) else back
+        if cells == own or log.undefined_total:
+            return None
+        felt, written = cells.split(BLANK), own.split(BLANK)
+        first = _alike(felt, written)
+        last = min(_alike(felt[::-1], written[::-1]), len(felt) - first, len(written) - first)
+        if len(words) != len(written):  # words of several pieces
+            first = last = 0
+        differing = words[first : len(words) - last]
+        said = text[differing[0].start : differing[-1].end].strip() if differing else ""
+        cut = (begun and not first and not own.startswith(felt[0])) or (
+            goes_on and not last and not own.endswith(felt[-1])
+        )
+        if not cut and not _indicated(said):
+            return None
+        back, likely = (
+            back_translate(self.tables, BLANK.join(part[first : len(part) - last])) for part in (felt, written)
+        )
+        look: Callable[[str], str] = _letters if cut else _indicated
+        return None if look(back) in (look(said), look(likely)) else (said, back)
+
+
+def _alike(one: list[str], other: list[str]) -> int:
+    """How many of the first words are the same."""
+    shorter = min(len(one), len(other))
+    return next((at for at in range(shorter) if one[at] != other[at]), shorter)
 
 
 def _letters(text: str) -> str:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise, repeat
+from itertools import chain, pairwise, repeat
 from operator import itemgetter
 from typing import Any
 
-from ..scene import GoesOn
+from ..scene import GoesOn, PageNumber
 from .dots import BLANK
 
 __all__ = [
@@ -21,7 +21,10 @@ Emphases = tuple[tuple[int, int, int], ...]
 
 
 def join_pages(
-    pages: Iterable[str], encoding: Mapping[str, Any], goes_on: Iterable[Sequence[GoesOn]] | None = None
+    pages: Iterable[str],
+    encoding: Mapping[str, Any],
+    goes_on: Iterable[Sequence[GoesOn]] | None = None,
+    numbers: Iterable[PageNumber | None] = (),
 ) -> str:
     """The cells of all pages as one line of Braille with single blanks, cut words joined again.
 
@@ -31,12 +34,17 @@ def join_pages(
     encoding : of the scene; ``run``, ``hyphen`` and ``continuation`` are used.
     goes_on : of each page, as frames have it. What was added there is taken out again, where it is felt. Without
         it (manifests of old do not say) the dots decide: hyphens and signs of continuation at the end of a run.
+    numbers : of each page, as frames have it: where it is felt, it is not of the text, and a page of nothing else is
+        passed over.
     """
     size = int(encoding["run"])
     parts: list[str] = []
     added: GoesOn | None = None
-    for page, notes in zip(pages, repeat(None) if goes_on is None else goes_on, strict=False):
-        cells = page.replace("\n", "")
+    shown = zip(pages, repeat(None) if goes_on is None else goes_on, chain(numbers, repeat(None)), strict=False)
+    for page, notes, number_shown in shown:
+        cells = _without_number(page.replace("\n", ""), number_shown)
+        if number_shown is not None and not cells.strip(BLANK):
+            continue
         added = added if cells else None
         for number, at in enumerate(range(0, len(cells), size)):
             run = cells[at : at + size]
@@ -55,6 +63,12 @@ def join_pages(
     return BLANK.join(part for part in "".join(parts).split(BLANK) if part)
 
 
+def _without_number(cells: str, number: PageNumber | None) -> str:
+    if number is None or not cells.startswith(number.cells, number.at):
+        return cells
+    return cells[: number.at] + BLANK * len(number.cells) + cells[number.at + len(number.cells) :]
+
+
 _DOTS = tuple(chr(code) for code in range(0x2801, 0x2900))
 
 
@@ -70,13 +84,16 @@ def _guessed(shown: str, size: int, encoding: Mapping[str, Any]) -> GoesOn | Non
     return GoesOn(0) if not hyphen and len(shown) == size else None
 
 
-def unmarked(page: str, encoding: Mapping[str, Any], goes_on: Sequence[GoesOn]) -> str:
-    """What a page alone shows: its cells as one line, without the marks where words go on.
+def unmarked(
+    page: str, encoding: Mapping[str, Any], goes_on: Sequence[GoesOn], number: PageNumber | None = None
+) -> str:
+    """What a page alone shows: its cells as one line, without its number and the marks where words go on.
 
     Indicators restated at the start of a run stay at the start of the page; within it they are taken out.
     """
     last = len(page.replace("\n", "")) // int(encoding["run"]) - 1
-    return join_pages([page], encoding, [[replace(one, ending="") if one.run == last else one for one in goes_on]])
+    notes = [replace(one, ending="") if one.run == last else one for one in goes_on]
+    return join_pages([page], encoding, [notes], [number])
 
 
 def covered_emphases(shown: Iterable[tuple[tuple[int, int], str]], emphases: Emphases) -> Emphases:

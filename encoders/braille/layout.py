@@ -1,4 +1,4 @@
-"""Where cells stand on a grid, and how words are laid out on pages so that the dots alone say where words end.
+"""Where cells stand on a grid, and the words and pages that are laid out so that the dots alone say where words end.
 
 Cells are read in order: a word goes on from the last cell of a line into the first of the next, and a blank
 ends it. Lines of eight or more cells are filled one by one, narrower ones page by page: the stretch within
@@ -13,19 +13,22 @@ starts with a blank; and a first part that ends without a sign is moved to the e
 run begins with its indicators again (a number sign, a sign of capitals), so that each run can be read alone.
 What exactly was added is in the page's `goes_on`, and from that pages are joined (see `encoders.braille.joining`).
 Runs of fewer than four cells have no room for such signs.
+
+A page of several runs (lines) holds block after block, as many as there is room for, with the indents and empty lines
+of their `LineStyle`; there "the first cell" of a run is the first after its indent. A page of one run holds words of
+one block only. How pages are filled is in `encoders.braille.filling`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..errors import LayoutError
-from ..scene import GoesOn, GridShape
-from .dots import BLANK
+from ..scene import GoesOn, GridShape, PageNumber
 
-__all__ = ["Cut", "Layout", "Page", "PlacedWord", "cut_anywhere", "paginate"]
+__all__ = ["FLUSH", "Cut", "Cutting", "Layout", "LineStyle", "Page", "PlacedWord", "SplitNote", "cut_anywhere"]
 
 NARROW = 8
 """Lines of fewer cells have no room for hyphens; words flow over the lines of a page."""
@@ -79,9 +82,34 @@ class Layout:
         """Cells in a run: a line, or a page when lines are narrow."""
         return self.cells_per_line if self.cells_per_line >= NARROW else self.capacity
 
+    @property
+    def lined(self) -> bool:
+        """Whether a page is several runs, each a line."""
+        return self.run < self.capacity
+
+
+class LineStyle(NamedTuple):
+    """How a block is laid out; it ends the block before it.
+
+    `first` blank cells stand before the first line, `over` before the others, `before` empty lines above it. A block
+    that is `centred` is so with three blank cells on both sides. One that `leads` to what follows never ends a page.
+    `page`: it begins a page. `line`: it is the next line of the same paragraph.
+    """
+
+    first: int = 0
+    over: int = 0
+    before: int = 0
+    centred: bool = False
+    leads: bool = False
+    page: bool = False
+    line: bool = False
+
+
+FLUSH = LineStyle()
+
 
 class PlacedWord(NamedTuple):
-    """Cells without a blank among them, and where they come from; ``cells == ""`` ends a paragraph.
+    """Cells of a word, and where they come from. A line of Braille that is kept as it is counts as one.
 
     `text` is what the table was given for the word; its character k comes from the source position
     ``base + places[at + k]``, or ``base + at + k`` without `places`. `glued` continues the word before it; `lettered`
@@ -128,13 +156,19 @@ class Cut(NamedTuple):
 
 
 class Page(NamedTuple):
-    """`cells` of a full page, lines run together and padded with blanks; `end_of_paragraph` after the last."""
+    """`cells` of a full page, lines run together and padded with blanks.
+
+    `end_of_block` where what is last on it ends there: a paragraph (`end_of_paragraph`), or a kept line of one.
+    `number` is the page's number where it stands among the cells, which are not of the text there.
+    """
 
     cells: str
     start: int
     end: int
+    end_of_block: bool
     end_of_paragraph: bool
     goes_on: tuple[GoesOn, ...] = ()
+    number: PageNumber | None = None
 
 
 SplitNote = Callable[[PlacedWord, Cut], None]
@@ -144,159 +178,3 @@ Cutting = Callable[[PlacedWord, int], Cut]
 def cut_anywhere(word: PlacedWord, room: int) -> Cut:
     """The cut at the last cell of `room`, for words without a text of their own."""
     return Cut(room, room, word.cells[:room])
-
-
-@dataclass
-class _Filler:
-    """The page being filled: `done` runs and the `run` at work, with the span of source they show."""
-
-    layout: Layout
-    done: list[str] = field(default_factory=list)
-    goes_on: list[GoesOn] = field(default_factory=list)
-    run: str = ""
-    owed: bool = False
-    last: str = ""
-    start: int = -1
-    end: int = 0
-
-    def __post_init__(self) -> None:
-        self.size = self.layout.run
-        self.width = self.layout.cells_per_line
-        self.runs_per_page = self.layout.capacity // self.layout.run
-
-    def place(self, position: int, cells: str, word: PlacedWord, end: int) -> None:
-        self.run = self.run.ljust(position, BLANK) + cells
-        self.last = word.text
-        if self.start < 0:
-            self.start = word.start
-        self.end = end
-
-    def spot(self, word: PlacedWord) -> int:
-        """Where a word goes in this run, -1 when it does not fit."""
-        length = len(word.cells)
-        position = len(self.run) + 1 if self.run else self.indent(word)
-        rest = position % self.width
-        if rest and rest + length > self.width:
-            aligned = position + self.width - rest
-            if aligned + length <= self.size:
-                return aligned
-            if self.run:
-                return -1
-        return position if position + length <= self.size else -1
-
-    def indent(self, word: PlacedWord) -> int:
-        """1 where the run before would be read on into this word, else 0."""
-        if self.owed or not self.last:
-            return int(self.owed)
-        # Signs of letters only: a number that fills its run and a number after it could be one.
-        return int(_has_digit(self.last) and _has_digit(word.text))
-
-    def end_run(self, word_ends: bool) -> Iterator[Page]:
-        layout, full = self.layout, len(self.run) == self.size
-        signs = tuple(sign for sign in (layout.hyphen, layout.continuation) if sign)
-        like_one = bool(signs) and self.run.endswith(signs)
-        self.owed = word_ends and (like_one or (full and not layout.hyphen))
-        if not (word_ends and full and layout.hyphen and not layout.continuation):
-            self.last = ""
-        self.done.append(self.run.ljust(self.size, BLANK))
-        self.run = ""
-        if len(self.done) == self.runs_per_page:
-            yield self._page(False)
-
-    def end_page(self) -> Iterator[Page]:
-        """Ends the paragraph on this page; the last page of it carries the mark."""
-        if not self.run and not self.done:
-            return
-        for page in self.end_run(True):
-            yield page._replace(end_of_paragraph=True)
-            return
-        while len(self.done) < self.runs_per_page:
-            self.owed, self.last = False, ""
-            self.done.append(BLANK * self.size)
-        yield self._page(True)
-
-    def _page(self, last: bool) -> Page:
-        start = self.start if self.start >= 0 else self.end
-        page = Page("".join(self.done), start, self.end, last, tuple(self.goes_on))
-        self.done.clear()
-        self.goes_on.clear()
-        self.start = -1
-        return page
-
-
-def _has_digit(text: str) -> bool:
-    return any(char.isdigit() for char in text)
-
-
-def paginate(words: Iterable[PlacedWord], layout: Layout, cut: Cutting, note: SplitNote) -> Iterator[Page]:
-    """Pages of cells.
-
-    Parameters
-    ----------
-    words : in reading order, the last one of each paragraph followed by one without cells.
-    cut : where to cut a word that has more cells than the room given.
-    note : told of every cut.
-    """
-    filler = _Filler(layout)
-    held: PlacedWord | None = None
-    for word in words:
-        if held is not None and word.glued:
-            held = _glued((yield from _fitted(held, filler, cut, note)), word)
-            continue
-        if held is not None:
-            held = yield from _fitted(held, filler, cut, note)
-            filler.place(filler.spot(held), held.cells, held, held.end)
-        held = word if word.cells else None
-        if held is None:
-            yield from filler.end_page()
-
-
-def _glued(before: PlacedWord, word: PlacedWord) -> PlacedWord:
-    places = [part.source(index) for part in (before, word) for index in range(len(part.text))]
-    return PlacedWord(
-        before.cells + word.cells, before.text + word.text, before.start, word.end, places, 0, 0, False, before.lettered
-    )
-
-
-def _fitted(word: PlacedWord, filler: _Filler, cut: Cutting, note: SplitNote) -> Generator[Page, None, PlacedWord]:
-    """The word, or what is left of it when its first parts are placed, with a run that has room for it."""
-    if filler.spot(word) >= 0:
-        return word
-    if filler.run:
-        yield from filler.end_run(True)
-    whole = word
-    while filler.spot(word) < 0:
-        room = filler.size - filler.indent(word)
-        if not room:
-            # A single cell has no other place for the blank between two words.
-            yield from filler.end_run(True)
-            continue
-        found = cut(word, room)
-        note(whole, found)
-        word = yield from _part(word, found, filler)
-    return word
-
-
-def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None, PlacedWord]:
-    """Place the first part of a word, and give the rest."""
-    signs = tuple(sign for sign in (filler.layout.hyphen, filler.layout.continuation) if sign)
-    marked = bool(signs) and found.first.endswith(signs)
-    position = filler.indent(word) if marked else filler.size - len(found.first)
-    end = start = word.end
-    if 0 < found.text < len(word.text):
-        start = word.source(found.text)
-        # A character whose name is cut is shown on both pages.
-        shared = start == word.source(found.text - 1)
-        end = start + 1 if shared else max(start, word.start + 1)
-        start = start if shared else end
-    filler.place(position, found.first, word, end)
-    filler.goes_on.append(GoesOn(len(filler.done), found.mark, found.restated, found.ending, found.left_out))
-    yield from filler.end_run(False)
-    return word._replace(
-        cells=found.restated + word.cells[found.cells :],
-        text=word.text[found.text :],
-        at=word.at + found.text,
-        start=min(start, word.end - 1),
-        lettered=found.lettered,
-        kept=len(found.restated),
-    )

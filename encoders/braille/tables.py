@@ -10,7 +10,6 @@ from pathlib import Path
 
 from ..errors import TableMissing
 from . import louis_binding
-from .table_queries import answer, list_tables
 
 __all__ = ["foreign_tables", "hyphenation_tables", "resolve_tables", "table_dots"]
 
@@ -32,7 +31,7 @@ def resolve_tables(spec: str) -> tuple[str, ...]:
     """
     wish = _checked(spec)
     if _is_query(wish):
-        return (answer(wish),)
+        return (_answer(wish),)
     tables = tuple(part.strip() for part in wish.split(",") if part.strip())
     for name in tables:
         # liblouis would wait for a pipe, and read a device without an end.
@@ -54,6 +53,13 @@ def _checked(spec: str) -> str:
     return wish
 
 
+def _answer(wish: str) -> str:
+    # Imported here, as below: who names a table that is there asks nothing.
+    from .table_queries import answer
+
+    return answer(wish)
+
+
 def _is_query(wish: str) -> bool:
     return ":" in wish and not any(sign in wish for sign in "/\\")
 
@@ -66,6 +72,8 @@ _PLACE = re.compile(r"[^\n]*?:\d+(?=: )")
 
 
 def _complaint(wish: str, tables: tuple[str, ...]) -> str:
+    from .table_queries import list_tables
+
     known = {info.file: info for info in list_tables()}
     files = {path.name for folder in _folders() for path in folder.iterdir()}
     missing = [name for name in tables if name not in files and not Path(name).is_file()]
@@ -103,7 +111,7 @@ def foreign_tables(spec: str) -> tuple[str, ...]:
         When liblouis is not installed.
     """
     wish = _checked(spec)
-    names = [answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
+    names = [_answer(wish)] if _is_query(wish) else [part.strip() for part in wish.split(",") if part.strip()]
     own = {path.name for folder in _folders() for path in folder.iterdir()}
     return tuple(name for name in names if name not in own or os.path.lexists(name))
 

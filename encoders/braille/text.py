@@ -6,30 +6,30 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from ..choices import EmphasisChoice, ImageChoice, Mathematics, Presentation, Undefined
+from ..choices import EmphasisChoice, PageNumbering, Presentation, TextOptions, Undefined
 from ..errors import EmptyText, LayoutError
-from ..scene import Frame, GridShape, Scene, TargetPattern
+from ..scene import Frame, GridShape, PageNumber, Scene, TargetPattern
 from . import louis_binding
 from .alphabet import alphabet, own_letters_eight
 from .back_check import BackCheck, FeltPage, back_check
 from .dots import BLANK, HIGHEST_6_DOT
+from .filling import paginate
 from .joining import emphases_within
-from .layout import Cut, Layout, PlacedWord, cut_anywhere, paginate
+from .layout import FLUSH, Cut, Layout, LineStyle, Page, PlacedWord, SplitNote, cut_anywhere
 from .presentation import MIN_PART_S, presenter, read_cells
 from .readers.sources import SourceKind, TextSource
 from .report import EncodingReport, ReportLog, Split
 from .tables import resolve_tables, table_dots
-from .transcribe import PARAGRAPH_END, Transcriber
+from .transcribe import LINE_END, PARAGRAPH_END, Transcriber, paragraphs
 from .undefined import writable
 
-__all__ = ["TextFrames", "TextOptions", "TextScene", "encode_text"]
+__all__ = ["TextFrames", "TextScene", "encode_text"]
 
 DEFAULT_RATE = 6.0
 ROOM_FOR_SIGNS = 4
@@ -38,71 +38,8 @@ SHORT_PAGE_S = 1.0
 """A page with few cells lasts as long as it would with more, up to this."""
 MOST_KEPT = 1 << 18
 """Actuators of all frames of a text together, up to which its frames are kept: 7281 frames of 6 x 6, some 10 MB."""
-
-
 WIDE = 12
-"""Cells of a line that has room for indicators of emphasis."""
-_CHOICES: dict[str, type[StrEnum]] = {
-    "undefined": Undefined, "presentation": Presentation, "emphasis": EmphasisChoice, "images": ImageChoice,
-    "math": Mathematics,
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class TextOptions:
-    """How a text is encoded.
-
-    Attributes
-    ----------
-    table : translation table: a file name, a comma list, or a query such as ``language:de grade:2``.
-    undefined : what becomes of characters the table cannot write.
-    cell_gap, line_gap : actuators left free between cells and between lines.
-    rate : cells per second; a page lasts (cells up to its last one) / rate, but at least 1 s or, where that is
-        less, (cells it has room for) / rate. None means 6: 1 s for 3 x 2 cells.
-    dwell_s : seconds a page lasts, instead of `rate`. Shown in parts, a page gives each part an equal share,
-        but at least 0.6 s; it then lasts longer.
-    presentation : dots together, by row, or by dot. None: together, and whoever plans it may take another.
-    blank_between : a blank frame between paragraphs.
-    dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
-    emphasis : whether emphasis of documents is written; None for lines of 12 cells or more.
-    images : whether images of documents are words or pictures; pictures are for `dotwave.text`, here they are words.
-    math : how formulas of documents are written, where a file is read.
-    encoding : of the characters of a file that is read; None for what it says itself, else UTF-8.
-    start_at : a page from 1, the words of a heading, or words of the text, at which to begin.
-    pages : such as ``10-20``, counted from there.
-
-    A choice may be given as its word.
-
-    Raises
-    ------
-    LayoutError
-        When a word is not one of its choices.
-    """
-
-    table: str = "en-ueb-g2.ctb"
-    undefined: Undefined = Undefined.NAME
-    cell_gap: int = 0
-    line_gap: int = 0
-    rate: float | None = None
-    dwell_s: float | None = None
-    presentation: Presentation | None = None
-    blank_between: bool = False
-    dots: int | None = None
-    emphasis: EmphasisChoice | None = None
-    images: ImageChoice = ImageChoice.WORDS
-    math: Mathematics = Mathematics.NEMETH
-    encoding: str | None = None
-    start_at: str | int | None = None
-    pages: str | int | None = None
-
-    def __post_init__(self) -> None:
-        for name, kind in _CHOICES.items():
-            given = getattr(self, name)
-            if given is None and name in ("emphasis", "presentation"):
-                continue
-            if given not in list(kind):
-                raise LayoutError(f"{name}: expected one of {', '.join(kind)}, got {given!r}")
-            object.__setattr__(self, name, kind(given))
+"""Cells of a line that has room for indicators of emphasis, and for the number of the page."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,8 +58,8 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
 
     Frames are made while they are consumed, in memory that does not grow with the text. ``encoding`` holds
     what a reader of the dots needs: kind, tables, dots, cell_gap, line_gap, lines, cells_per_line, run,
-    hyphen and continuation (see `encoders.braille.layout`), passages, presentation, undefined, liblouis (its version),
-    and where emphasis is written, emphases.
+    hyphen and continuation (see `encoders.braille.layout`), passages, presentation, undefined, liblouis (its version);
+    emphases where emphasis is written, and page_numbers where they are shown.
 
     Raises
     ------
@@ -161,8 +98,17 @@ def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> Te
     layout = Layout(shape, 3 if dots == 6 else 4, options.cell_gap, options.line_gap)
     transcriber = Transcriber(tables, options.undefined, dots, passages=layout.run < layout.capacity)
     _refuse_unwritable(source, transcriber)
-    if source.kind is SourceKind.TEXT and layout.run >= ROOM_FOR_SIGNS:
+    corner = options.page_numbers is PageNumbering.CORNER
+    if corner and layout.capacity < 2:
+        raise LayoutError("page-numbers: a page of one cell has no room for a number; choose frame or none")
+    status = corner and layout.cells_per_line < WIDE
+    if source.kind is SourceKind.TEXT and layout.run - status * (not layout.lined) >= ROOM_FOR_SIGNS:
         layout = replace(layout, hyphen=transcriber.hyphen(), continuation=transcriber.continuation())
+    if _by_lines(source, options, layout):
+        # Imported here, as below: words that run on over small pages do without.
+        from .lines import with_lines
+
+        source = with_lines(source, options.lines, layout)
     if _keeps_emphasis(options, layout) and source.document is not None:
         source = replace(source, emphases=source.document.emphases)
     encoding: dict[str, Any] = {
@@ -181,9 +127,17 @@ def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> Te
         "undefined": options.undefined.value,
         "liblouis": louis_binding.liblouis_version(),
     }
+    if options.page_numbers is not PageNumbering.NONE:
+        encoding["page_numbers"] = options.page_numbers.value
     if source.emphases:
         encoding["emphases"] = [list(one) for one in source.emphases]
     return TextFrames(source, transcriber, layout, options, encoding)
+
+
+def _by_lines(source: TextSource, options: TextOptions, layout: Layout) -> bool:
+    """Whether lines, of the text or of the page, say where words stand."""
+    braille = source.kind is SourceKind.BRAILLE
+    return layout.lined or options.lines is not None or braille or LINE_END in source.text
 
 
 def _keeps_emphasis(options: TextOptions, layout: Layout) -> bool:
@@ -220,7 +174,7 @@ def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
     if source.kind is SourceKind.BRAILLE or not letters.lacks(source.text):
         return
     if transcriber.undefined is Undefined.ERROR:
-        for start, end in transcriber.paragraphs(source):
+        for start, end in paragraphs(source.text):
             for _ in transcriber.words(source, start, end, ReportLog()):
                 pass
     different = "".join(sorted(set(source.text)))
@@ -280,31 +234,63 @@ class TextFrames:
 
     def _encoded(self) -> Iterator[Frame]:
         self._log = log = ReportLog()
-        text, show = self.source.text, self._show
-        between = False
-        for page in paginate(self._words(log), self.layout, self._cut, self._note):
+        text, between = self.source.text, False
+        own_frame = self.options.page_numbers is PageNumbering.FRAME
+        total = sum(1 for _ in self.page_spans()) if own_frame else 0
+        for number, page in enumerate(self._pages(log, self._note)):
             if between:
                 yield self._blank_frame(log, page.start)
-            shown = show(page.cells)
-            dwell_s = max(self._shortest_s, len(page.cells.rstrip(BLANK)) * self._s_per_cell)
-            share_s = dwell_s if len(shown.parts) == 1 else max(dwell_s / len(shown.parts), MIN_PART_S)
+            if own_frame:
+                yield from self._number_frames(log, number + 1, total, page.start)
             # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
-            gap = PARAGRAPH_END.match(text, page.end) if page.end_of_paragraph else None
+            gap = PARAGRAPH_END.match(text, page.end) if page.end_of_block else None
             span = (page.start, gap.end() if gap else page.end)
             first, last = (bisect_left(self._headings, place, key=itemgetter(0)) for place in span)
             headings = tuple(heading for _, heading in self._headings[first:last])
-            for pattern in shown.parts:
-                yield Frame(pattern, share_s, log.pages, text[slice(*span)], span, shown.cells, page.goes_on, headings)
+            for frame in self._shown(page, log.pages):
+                yield replace(frame, text=text[slice(*span)], span=span, goes_on=page.goes_on, headings=headings)
                 headings = ()
-            log.frames += len(shown.parts)
+                log.frames += 1
             log.cells += len(page.cells) - page.cells.count(BLANK)
             log.pages += 1
             between = self.options.blank_between and page.end_of_paragraph
 
+    def _shown(self, page: Page, number: int) -> Iterator[Frame]:
+        """The frames of a page: its cells in one part or several, and how long."""
+        shown = self._show(page.cells)
+        said = page.cells if page.number is None else page.cells[: page.number.at]
+        cells = len(said.rstrip(BLANK)) + (len(page.number.cells) if page.number else 0)
+        dwell_s = max(self._shortest_s, cells * self._s_per_cell)
+        share_s = dwell_s if len(shown.parts) == 1 else max(dwell_s / len(shown.parts), MIN_PART_S)
+        for pattern in shown.parts:
+            yield Frame(pattern, share_s, number, cells=shown.cells, number=page.number)
+
+    def _number_frames(self, log: ReportLog, number: int, total: int, position: int) -> Iterator[Frame]:
+        """The number of the page to come and of all, on a page or where that is too small on two."""
+        write, room = self._transcriber.number, self.layout.capacity
+        whole = write(f"{number}/{total}")
+        for cells in [whole] if len(whole) <= room else [write(f"{number}"), write(f"/{total}")]:
+            sign = cells[-room:]
+            page = Page(sign.ljust(room, BLANK), position, position, False, False, number=PageNumber(0, sign))
+            for frame in self._shown(page, log.pages):
+                yield replace(frame, span=(position, position))
+                log.frames += 1
+            log.pages += 1
+
+    def _corner(self, number: int) -> str:
+        """The cells at the end of a page with its number: on narrow lines the last digit alone."""
+        cells = self._transcriber.number(str(number))
+        return 2 * BLANK + cells if self.layout.cells_per_line >= WIDE else cells[-1:]
+
+    def _pages(self, log: ReportLog, note: SplitNote) -> Iterator[Page]:
+        numbered = self._corner if self.options.page_numbers is PageNumbering.CORNER else None
+        blanks = self.options.blank_between
+        return paginate(self._words(log), self.layout, self._cut, note, numbered, blanks)
+
     def page_spans(self) -> Iterator[tuple[int, int]]:
-        """(start, end) in the source of every page, blank ones too; nothing is drawn."""
+        """(start, end) in the source of every page, blank ones too, but not of numbers; nothing is drawn."""
         between = False
-        for page in paginate(self._words(ReportLog()), self.layout, self._cut, lambda word, cut: None):
+        for page in self._pages(ReportLog(), lambda word, cut: None):
             if between:
                 yield page.start, page.start
             yield page.start, page.end
@@ -318,10 +304,23 @@ class TextFrames:
         log.frames += 1
         return frame
 
-    def _words(self, log: ReportLog) -> Iterator[PlacedWord]:
-        for start, end in self._transcriber.paragraphs(self.source):
-            yield from self._transcriber.words(self.source, start, end, log)
-            yield PlacedWord("", "", end, end, None, 0, 0, False)
+    def _words(self, log: ReportLog) -> Iterator[PlacedWord | LineStyle]:
+        source, layout, transcriber = self.source, self.layout, self._transcriber
+        if not _by_lines(source, self.options, layout):
+            for start, end in paragraphs(source.text):
+                yield FLUSH
+                yield from transcriber.words(source, start, end, log)
+            return
+        from .lines import keeps_cells, styled_blocks, styled_lines
+
+        if keeps_cells(source, self.options.lines, layout):
+            for start, end, style in styled_lines(source):
+                yield style
+                yield from transcriber.kept_line(source, start, end, log)
+            return
+        for start, end, style in styled_blocks(source, layout, self.options.blank_between):
+            yield style
+            yield from transcriber.words(source, start, end, log)
 
     def _cut(self, word: PlacedWord, room: int) -> Cut:
         if self.source.kind is SourceKind.BRAILLE:
@@ -343,5 +342,6 @@ class TextFrames:
             parts = list(group)
             dots = np.any([np.abs(part.pattern.amplitude) > 0.5 for part in parts], axis=0)
             emphases = emphases_within(self.source.emphases, *parts[0].span)
-            pages.append(FeltPage(read_cells(dots, self.encoding), parts[0].text, parts[0].goes_on, emphases))
+            cells, first = read_cells(dots, self.encoding), parts[0]
+            pages.append(FeltPage(cells, first.text, first.goes_on, emphases, first.number))
         return back_check(pages, self.source.text, self.encoding, self.source.emphases)

@@ -21,12 +21,14 @@ from .tables import hyphenation_tables
 from .translation import translated
 from .undefined import ZERO_WIDTH_JOINER, Writable, extends, writable
 
-__all__ = ["PARAGRAPH_END", "Transcriber"]
+__all__ = ["LINE_END", "PARAGRAPH_END", "Transcriber", "paragraphs"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
+LINE_END = "\u2028"
+"""A line end that is kept, see `encoders.braille.lines`; what is before and after it is written apart."""
 # Blanks are looked at from where they begin, or a long run of them would be gone through from each.
-PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|(?<!\s)\s*[\f\u2029]\s*|[\f\u2029]\s*")
+PARAGRAPH_END = re.compile(r"\n[^\S\n]*\n\s*|(?<!\s)\s*[\f\u2028\u2029]\s*|[\f\u2028\u2029]\s*")
 _SPACE = re.compile(r"\s")
 _WORD = re.compile(r"\S+")
 _ARROWS = "\u2190"
@@ -62,6 +64,17 @@ def _emphasis_of(forms: Sequence[int], start: int, stop: int) -> int:
     return found.pop() if len(found) == 1 else 0
 
 
+def paragraphs(text: str) -> Iterator[tuple[int, int]]:
+    """(start, end) of each paragraph: parted by an empty line, a form feed or a line end that is kept."""
+    start = 0
+    for match in PARAGRAPH_END.finditer(text):
+        if text[start : match.start()].strip():
+            yield start, match.start()
+        start = match.end()
+    if text[start:].strip():
+        yield start, len(text)
+
+
 class Transcriber:
     """Writes sources in Braille with one list of tables.
 
@@ -78,16 +91,6 @@ class Transcriber:
         self.undefined = undefined
         self.dots = dots
         self.passages = passages
-
-    def paragraphs(self, source: TextSource) -> Iterator[tuple[int, int]]:
-        """(start, end) of each paragraph: parted by an empty line or a form feed."""
-        start = 0
-        for match in PARAGRAPH_END.finditer(source.text):
-            if source.text[start : match.start()].strip():
-                yield start, match.start()
-            start = match.end()
-        if source.text[start:].strip():
-            yield start, len(source.text)
 
     def words(self, source: TextSource, start: int, end: int, log: ReportLog) -> Iterator[PlacedWord]:
         """Words of one paragraph; together their spans hold every character that is not white space."""
@@ -111,6 +114,12 @@ class Transcriber:
                 at += len(word) + 1
         if held is not None:
             yield held._replace(end=_end(text, held.start, end))
+
+    def kept_line(self, source: TextSource, start: int, end: int, log: ReportLog) -> Iterator[PlacedWord]:
+        """A line of Braille with the blank cells in it, as one word; none without a dot."""
+        cells = self._piece(source, start, end, log).cells.strip(BLANK)
+        if cells:
+            yield PlacedWord(cells, source.text[start:end], start, end, None, 0, start, False)
 
     def _piece(self, source: TextSource, start: int, stop: int, log: ReportLog) -> _Piece:
         chunk = source.text[start:stop]
@@ -140,6 +149,11 @@ class Transcriber:
             cells += some
             origin += [start + position for position in back] if start else back
         return cells, origin
+
+    def number(self, words: str) -> str:
+        """Cells of digits and what stands between them."""
+        cells = translated(self.tables, words)[0].strip(BLANK)
+        return _six_dots(cells) if self.dots == 6 else cells
 
     def hyphen(self) -> str:
         """The table's hyphen, empty when there is no hyphenation dictionary for its language."""

@@ -1,11 +1,17 @@
-"""Raising the similarity dot by dot: flips of one dot, of two, and on large grids of many that do not touch."""
+"""Raising the similarity dot by dot: flips of one dot, of two, and on large grids of many that do not touch.
+
+One half of the measure is c.p / sqrt(p.M.p). A flip of dot i adds s = 1 - 2 p_i there, which changes the upper part by
+s c_i and the lower one by 2 s (M p)_i + M_ii: all flips of many patterns are judged at once.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .similarity import Quadratic, Target, agreement, slopes
+from .similarity import SHARES, Target, agreement, matrices, pulls, ratio, squares
 
 __all__ = ["climbed", "nearby", "neighbours", "swept"]
 
@@ -13,45 +19,93 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 GAIN = 1e-9
-FLAT = 1e-9
 SWEEPS = 40
 
 
-def climbed(parts: list[Quadratic], dots: Bools, ties: Floats) -> Bools:
-    """The pattern reached from `dots` by the best flip of one group, or else of two, until no flip helps.
+def climbed(target: Target, begins: Bools, ties: Floats) -> tuple[Bools, Floats]:
+    """The patterns reached by the best flip of one group until none helps, the best of them by flips of two as well.
 
     Parameters
     ----------
-    dots : bool, shape (n,).
-    ties : float64, shape (n, groups), the dots that are flipped together.
+    begins : bool, shape (A, dots).
+    ties : float64, shape (dots, groups), the dots that are flipped together.
+
+    Returns
+    -------
+    Patterns, bool, shape (A, dots), and their similarity with the first figure of the target, shape (A,).
     """
-    small = [Quadratic(part.share, part.linear @ ties, ties.T @ part.matrix @ ties) for part in parts]
-    state = (dots @ ties) >= 0.5 * ties.sum(axis=0)
-    best = float(_value(small, state))
-    while True:
-        one = _one_flip(small, state)
-        index = int(one.argmax())
-        if one[index] > best + GAIN:
-            state[index] ^= True
-            best = float(one[index])
-            continue
-        two = _two_flips(small, state)
-        flat = int(two.argmax())
-        if two.flat[flat] <= best + GAIN:
-            done: Bools = (ties @ state) > 0.5
-            return done
-        for index in divmod(flat, len(state)):
-            state[index] ^= True
-        best = float(two.flat[flat])
+    small = [ties.T @ matrix @ ties for matrix in matrices(target.shape)]
+    linear = [half[0] @ ties for half in target.linear]
+    states = (begins @ ties) >= 0.5 * ties.sum(axis=0)
+    values = _by_single_flips(linear, small, states)
+    best = int(values.argmax())
+    while _flipped_two(linear, small, states[best], float(values[best])):
+        values[best] = _by_single_flips(linear, small, states[best : best + 1])[0]
+    done: Bools = (states @ ties.T) > 0.5
+    return done, values
 
 
-def neighbours(parts: list[Quadratic], dots: Bools, count: int) -> list[tuple[float, Bools]]:
+def _by_single_flips(linear: Sequence[Floats], small: Sequence[Floats], states: Bools) -> Floats:
+    """Flip in place until nothing helps; the similarity reached."""
+    values = np.zeros(len(states))
+    live = np.arange(len(states))
+    while len(live):
+        now, flipped = _single_flips(linear, small, states[live])
+        values[live] = now
+        best = flipped.argmax(axis=1)
+        helps = flipped[np.arange(len(live)), best] > now + GAIN
+        live, best = live[helps], best[helps]
+        states[live, best] ^= True
+    return values
+
+
+def _single_flips(linear: Sequence[Floats], small: Sequence[Floats], states: Bools) -> tuple[Floats, Floats]:
+    """Similarity of patterns, shape (A,), and after each flip, shape (A, groups)."""
+    raised = states.astype(np.float64)
+    sign = 1 - 2 * raised
+    now, flipped = np.zeros(len(states)), np.zeros(states.shape)
+    for share, c, matrix in zip(SHARES, linear, small, strict=True):
+        pull = raised @ matrix
+        top, square = raised @ c, (raised * pull).sum(axis=1)
+        now += share * ratio(top, square)
+        flipped += share * ratio(top[:, None] + sign * c, square[:, None] + 2 * sign * pull + np.diag(matrix))
+    return now, flipped
+
+
+def _flipped_two(linear: Sequence[Floats], small: Sequence[Floats], state: Bools, value: float) -> bool:
+    """Flip the best two in place when that helps; whether it did."""
+    values = _double_flips(linear, small, state)
+    flat = int(values.argmax())
+    if values.flat[flat] <= value + GAIN:
+        return False
+    for index in divmod(flat, len(state)):
+        state[index] ^= True
+    return True
+
+
+def _double_flips(linear: Sequence[Floats], small: Sequence[Floats], state: Bools) -> Floats:
+    raised = state.astype(np.float64)
+    sign = 1 - 2 * raised
+    total = np.zeros((len(state), len(state)))
+    for share, c, matrix in zip(SHARES, linear, small, strict=True):
+        pull = matrix @ raised
+        step, bend = sign * c, 2 * sign * pull + np.diag(matrix)
+        top = c @ raised + step[:, None] + step
+        below = raised @ pull + bend[:, None] + bend + 2 * sign[:, None] * sign * matrix
+        total += share * ratio(top, below)
+    np.fill_diagonal(total, -np.inf)
+    return total
+
+
+def neighbours(target: Target, dots: Bools, count: int) -> list[tuple[float, Bools]]:
     """A pattern and the most similar of those that differ from it in one or two dots, `count` in all at most."""
-    found = [(float(_value(parts, dots)), dots)]
+    linear, small = [half[0] for half in target.linear], matrices(target.shape)
+    now, flipped = _single_flips(linear, small, dots[None])
+    found = [(float(now[0]), dots)]
     if count == 1:
         return found
-    values = _two_flips(parts, dots)
-    np.fill_diagonal(values, _one_flip(parts, dots))
+    values = _double_flips(linear, small, dots)
+    np.fill_diagonal(values, flipped[0])
     values[np.tril_indices(len(dots), -1)] = -np.inf
     order = np.argsort(-values, axis=None, kind="stable")[: count - 1]
     order = order[np.isfinite(values.flat[order])]
@@ -66,6 +120,8 @@ def neighbours(parts: list[Quadratic], dots: Bools, count: int) -> list[tuple[fl
 def nearby(target: Target, dots: Floats, count: int) -> list[tuple[float, Bools]]:
     """As `neighbours` for a large grid, of which only one dot is flipped; dots of shape (rows, cols), 0 or 1."""
     value, raised = float(agreement(target, dots[None, None])[0, 0]), dots.ravel() > 0.5
+    if count == 1:
+        return [(value, raised)]
     gains = _gains(target, dots).ravel()
     order = np.argsort(-gains, kind="stable")[: count - 1]
     changed = np.repeat(raised[None], len(order), axis=0)
@@ -95,51 +151,17 @@ def swept(target: Target, dots: Floats) -> Floats:
     return dots
 
 
-def _value(parts: list[Quadratic], state: Bools) -> float:
-    raised = state.astype(np.float64)
-    halves = [part.share * float(_ratio(part.linear @ raised, raised @ part.matrix @ raised)) for part in parts]
-    return sum(halves)
-
-
-def _one_flip(parts: list[Quadratic], state: Bools) -> Floats:
-    raised = state.astype(np.float64)
-    sign = 1 - 2 * raised
-    total = np.zeros(len(state))
-    for part in parts:
-        pull = part.matrix @ raised
-        top = part.linear @ raised + sign * part.linear
-        total += part.share * _ratio(top, raised @ pull + 2 * sign * pull + np.diag(part.matrix))
-    return total
-
-
-def _two_flips(parts: list[Quadratic], state: Bools) -> Floats:
-    raised = state.astype(np.float64)
-    sign = 1 - 2 * raised
-    total = np.zeros((len(state), len(state)))
-    for part in parts:
-        pull = part.matrix @ raised
-        step, bend = sign * part.linear, 2 * sign * pull + np.diag(part.matrix)
-        top = part.linear @ raised + step[:, None] + step
-        below = raised @ pull + bend[:, None] + bend + 2 * sign[:, None] * sign * part.matrix
-        total += part.share * _ratio(top, below)
-    np.fill_diagonal(total, -np.inf)
-    return total
-
-
-def _ratio(top: Floats, square: Floats) -> Floats:
-    ratio: Floats = np.where(square > FLAT, top / np.sqrt(np.maximum(square, FLAT)), 0.0)
-    return ratio
-
-
 def _gains(target: Target, dots: Floats) -> Floats:
     """Change of the similarity by each single flip, shape (rows, cols)."""
-    sign = 1 - 2 * dots
-    total = np.zeros_like(dots)
-    for part in slopes(target, dots):
-        now = _ratio(np.asarray(part.top), np.asarray(part.square))
-        flipped = _ratio(part.top + sign * part.linear, part.square + 2 * sign * part.pull + part.diagonal)
-        total += part.share * (flipped - now)
-    return total
+    raised = dots.ravel()
+    sign = 1 - 2 * raised
+    total = np.zeros_like(raised)
+    parts = zip(SHARES, target.linear, pulls(target.shape, raised), squares(target.shape), strict=True)
+    for share, (c,), pull, diagonal in parts:
+        top, square = c @ raised, raised @ pull
+        now = ratio(np.asarray(top), np.asarray(square))
+        total += share * (ratio(top + sign * c, square + 2 * sign * pull + diagonal) - now)
+    return total.reshape(dots.shape)
 
 
 def _highest(values: Floats) -> Floats:

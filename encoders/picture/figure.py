@@ -100,8 +100,8 @@ def spaced_steps(figure: Floats, options: PictureOptions, pixels_per_m: float) -
         steps.append(Step("thicken", figure))
     # A gap of one actuator comes by itself, as dots do not touch.
     for name, least_m in (
-        ("minimum stroke", options.stroke_m or 0.0),
-        ("minimum gap", options.gap_m if options.gap_m > pitch else 0.0),
+        ("minimum stroke", options.stroke_m),
+        ("minimum gap", options.gap_m if (options.gap_m or 0.0) > pitch else 0.0),
     ):
         if not least_m:
             continue

@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 from ..scene import GridShape
 from .climb import climbed, nearby, neighbours, swept
 from .options import Fit
-from .similarity import POINTS, Target, agreement, quadratics, target_of
-from .steps import content_box
+from .similarity import DENSE_DOTS, POINTS, Target, agreement, target_of
+from .steps import content_box, otsu
 
-__all__ = ["Candidate", "Fitted", "Window", "best_patterns", "choose_windows", "plain_size", "sampled"]
+__all__ = ["Candidate", "Fitted", "Window", "best_patterns", "choose_window", "plain_size", "sampled"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-CLIMBED_WINDOWS = 3
-DENSE_DOTS = 144
-CLOSER_BY = 1 / 13
+CLIMBED = 3
 CUTS = (0.3, 0.45, 0.6, 0.75)
-SYMMETRIC = 0.93
+# Icons that are nearly symmetric have their mark in what is not.
+SYMMETRIC = 0.99
 
 
 @dataclass(frozen=True)
@@ -101,66 +100,21 @@ def plain_size(
     return scale * high_m, scale * wide_m
 
 
-def choose_windows(
+def choose_window(
     figure: NDArray[np.float32], shape: GridShape, fit: Fit, pitch_m: tuple[float, float], crop: bool
-) -> list[Window]:
-    """Windows worth trying: the plain fit, and for `contain` small changes of size, width and place.
+) -> Window:
+    """The part of a picture that is laid on the grid: the plain fit around the middle of the content.
 
-    A figure that fills the grid is cut by up to 1/26 on each side (a quarter of an actuator of six), or stretched
-    by up to a fifth; one that leaves room is moved by half an actuator, unless it is symmetric in that direction.
-    `cover` tries cuts of 1/13 in all.
+    Other sizes and places can raise the similarity, but patterns in their true place are known more often.
     """
     height, width = figure.shape
     top, bottom, left, right = content_box(figure) if crop else (0, height, 0, width)
-    tall, wide = bottom - top, right - left
-    middle = (top + bottom) / 2, (left + right) / 2
-    if fit is Fit.STRETCH:
-        return [Window(top, bottom, left, right)]
-    high_m, wide_m = shape.rows * pitch_m[0], shape.cols * pitch_m[1]
-    by_rows, by_cols = tall / high_m, wide / wide_m
-    if fit is Fit.COVER:
-        scale = min(by_rows, by_cols)
-        return _closer_by_a_little(middle, scale * high_m, scale * wide_m)
-    scale = max(by_rows, by_cols)
-    if not crop:
-        return [_around(middle, scale * high_m, scale * wide_m)]
-    mirror = symmetries(figure[top:bottom, left:right])
-    found: dict[Window, None] = {}
-    for closer in (1.0, 1 - CLOSER_BY):
-        for stretch in (1.0, 1 / 1.1, 1 / 1.2, 1 / 0.9):
-            down = scale * closer * high_m * (stretch if by_rows < by_cols else 1.0)
-            across = scale * closer * wide_m * (stretch if by_rows >= by_cols else 1.0)
-            down, across = max(down, tall * (1 - CLOSER_BY)), max(across, wide * (1 - CLOSER_BY))
-            for up in _moves(tall / down * shape.rows, shape.rows, mirror[0]):
-                for aside in _moves(wide / across * shape.cols, shape.cols, mirror[1]):
-                    place = middle[0] - up * down / shape.rows, middle[1] - aside * across / shape.cols
-                    found.setdefault(_around(place, down, across))
-    return list(found)
-
-
-def _closer_by_a_little(middle: tuple[float, float], height: float, width: float) -> list[Window]:
-    """The window itself, and smaller ones inside of it, in the middle and at its corners."""
-    found = [_around(middle, height, width)]
-    for down, across in ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)):
-        place = middle[0] + down * CLOSER_BY / 2 * height, middle[1] + across * CLOSER_BY / 2 * width
-        found.append(_around(place, (1 - CLOSER_BY) * height, (1 - CLOSER_BY) * width))
-    return found
+    high, wide = plain_size(figure, shape, fit, pitch_m, crop)
+    return _around(((top + bottom) / 2, (left + right) / 2), high, wide)
 
 
 def _around(middle: tuple[float, float], height: float, width: float) -> Window:
     return Window(middle[0] - height / 2, middle[0] + height / 2, middle[1] - width / 2, middle[1] + width / 2)
-
-
-def _moves(covered: float, available: int, symmetric: bool) -> tuple[float, ...]:
-    return (0.0,) if symmetric or covered > available - 0.4 else (-0.5, 0.0, 0.5)
-
-
-def symmetries(figure: NDArray[np.float32]) -> tuple[bool, bool]:
-    """Whether a figure is its own mirror image top to bottom, and left to right, seen with 24 x 24 points."""
-    if min(figure.shape) < 2:
-        return False, False
-    coarse = sampled(figure, [Window(0, figure.shape[0], 0, figure.shape[1])], GridShape(6, 6))[0]
-    return _mirrored(coarse, 0), _mirrored(coarse, 1)
 
 
 def _mirrored(figure: Floats, axis: int) -> bool:
@@ -168,11 +122,12 @@ def _mirrored(figure: Floats, axis: int) -> bool:
     return float((less * np.flip(less, axis)).sum()) >= SYMMETRIC * float((less**2).sum())
 
 
-def best_patterns(figure: NDArray[np.float32], windows: list[Window], shape: GridShape, count: int) -> Fitted:
-    """Search windows and dots for the patterns most similar to a figure.
+def best_patterns(figure: NDArray[np.float32], window: Window, shape: GridShape, count: int) -> Fitted:
+    """Search the dots for the patterns most similar to a figure.
 
-    Every window is scored with four thresholds of the mean over each dot; the best three windows are searched on
-    by flips of one and of two dots (mirror images together, where the figure is symmetric) until none helps.
+    The start is four thresholds of the mean over each dot, and Otsu's: what a plain box filter gives is among what
+    is tried. Each is improved by flips of one dot (mirror images together, where the figure is symmetric) until none
+    helps, the best of them by flips of two as well.
 
     Parameters
     ----------
@@ -185,49 +140,39 @@ def best_patterns(figure: NDArray[np.float32], windows: list[Window], shape: Gri
         With at least one candidate; more, up to `count`, are found near the best ones: by flips of one and two dots,
         on grids of more than 144 dots of one.
     """
-    target = target_of(sampled(figure, windows, shape), shape)
-    starts = cut_starts(target.figure, shape)
-    scores = agreement(target, starts)
-    order = np.argsort(-scores.max(axis=1), kind="stable")
-    order = order[: CLIMBED_WINDOWS if shape.rows * shape.cols <= DENSE_DOTS else 1]
-    found: dict[bytes, tuple[float, Bools, int]] = {}
-    for index in order:
-        for similarity, dots in _searched(target[int(index)], starts[index], scores[index], count):
-            key = dots.tobytes()
-            if key not in found or similarity > found[key][0]:
-                found[key] = similarity, dots, int(index)
+    target = target_of(sampled(figure, [window], shape), shape)
+    found: dict[bytes, tuple[float, Bools]] = {}
+    for similarity, dots in _searched(target, count):
+        found.setdefault(dots.tobytes(), (similarity, dots))
     ranked = sorted(found.items(), key=lambda item: (-item[1][0], item[0]))[:count]
     candidates = tuple(
-        Candidate(_frozen(dots.reshape(shape.rows, shape.cols)), similarity, windows[index])
-        for _, (similarity, dots, index) in ranked
+        Candidate(_frozen(dots.reshape(shape.rows, shape.cols)), similarity, window) for _, (similarity, dots) in ranked
     )
-    return Fitted(candidates, target.figure[ranked[0][1][2]])
+    return Fitted(candidates, target.figure[0])
 
 
 def cut_starts(figure: Floats, shape: GridShape) -> Floats:
-    """Patterns by thresholds of the mean of each dot; float64, shape (K, 4, rows, cols)."""
-    means = figure.reshape(len(figure), shape.rows, POINTS, shape.cols, POINTS).mean(axis=(2, 4))
-    top = means.max(axis=(1, 2), keepdims=True)
-    cuts: Floats = np.stack([means > cut * top for cut in CUTS], axis=1).astype(np.float64)
-    return cuts
+    """Patterns by thresholds of the mean of each dot; float64, shape (K, rows, cols)."""
+    means = figure.reshape(shape.rows, POINTS, shape.cols, POINTS).mean(axis=(1, 3))
+    cuts = [*(cut * means.max() for cut in CUTS), otsu(means.astype(np.float32))[0]]
+    starts: Floats = np.stack([means > cut for cut in cuts]).astype(np.float64)
+    return starts
 
 
-def _searched(target: Target, starts: Floats, scores: Floats, count: int) -> list[tuple[float, Bools]]:
+def _searched(target: Target, count: int) -> list[tuple[float, Bools]]:
     shape, size = target.shape, target.shape.rows * target.shape.cols
     if target.flat[0]:
         mean = float(target.figure.mean())
         return [(max(mean, 1 - mean), np.full(size, mean > 0.5))]
+    starts = cut_starts(target.figure[0], shape)
     if size > DENSE_DOTS:
-        best = int(scores.argmax())
+        best = int(agreement(target, starts)[0].argmax())
         return nearby(target, swept(target, starts[best]), count)
-    parts = quadratics(target)
-    ties = tied_dots(target.figure[0], shape)
-    order = np.argsort(-scores, kind="stable")[:2]
-    begins = {starts[int(k)].tobytes(): starts[int(k)].ravel() > 0.5 for k in order}
-    tops = {climbed(parts, begin, ties).tobytes(): None for begin in begins.values()}
+    tops, values = climbed(target, starts.reshape(len(starts), -1) > 0.5, tied_dots(target.figure[0], shape))
+    order = np.argsort(-values, kind="stable")[: 1 if count == 1 else CLIMBED]
     found: list[tuple[float, Bools]] = []
-    for raw in tops:
-        found += neighbours(parts, np.frombuffer(raw, np.bool_), count)
+    for index in order:
+        found += neighbours(target, tops[index], count)
     return found
 
 

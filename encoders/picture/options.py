@@ -15,8 +15,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-# Thinner lines beside solid parts would be lost between the dots of an 8 mm grid.
-ICON_STROKE_M = 5e-3
+# Lines that are closer may be felt as one.
+PHOTO_GAP_M = 6.4e-3
 
 
 class Style(StrEnum):
@@ -139,8 +139,8 @@ class PictureOptions:
     threshold_value: Annotated[float, Between(0.0, 1.0)] = 0.2
     invert: Invert = Invert.AUTO
     thicken: Annotated[float, Between(0.0, 4.0)] = 0.0
-    gap_m: Annotated[float, Between(0.0, 1.0)] = 6.4e-3
-    stroke_m: Annotated[float | None, Between(0.0, 1.0)] = None
+    gap_m: Annotated[float | None, Between(0.0, 1.0)] = None
+    stroke_m: Annotated[float, Between(0.0, 1.0)] = 0.0
     pitch_m: Annotated[tuple[float, float], Between(1e-5, 1.0)] = (8.3e-3, 8.3e-3)
     output: Output = Output.ON_OFF
     levels: Annotated[int, Between(1, 8)] = 3
@@ -172,10 +172,10 @@ class PictureOptions:
             self,
             style=style,
             crop=icon if self.crop is None else self.crop,
-            fit=self.fit or (Fit.CONTAIN if icon else Fit.COVER),
+            fit=self.fit or Fit.CONTAIN,
             contrast=not icon if self.contrast is None else self.contrast,
             threshold=self.threshold or Threshold.OTSU,
-            stroke_m=(ICON_STROKE_M if icon else 0.0) if self.stroke_m is None else self.stroke_m,
+            gap_m=(0.0 if icon else PHOTO_GAP_M) if self.gap_m is None else self.gap_m,
         )
 
 

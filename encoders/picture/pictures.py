@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from ..braille.presentation import MIN_PART_S
 from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
+from .doubt import doubt_of
 from .errors import EmptyPicture
 from .figure import Step, figure_steps, spaced_steps, style_of
-from .fit import Candidate, Window, best_patterns, choose_windows, plain_size, sampled
+from .fit import Candidate, Window, best_patterns, choose_window, plain_size, sampled
 from .limits import PictureLimits
-from .options import Fit, Output, PictureOptions, RegionsBy, Style
+from .options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
-from .regions import TEXTURES, TexturedRegion, dot_regions, textured
+from .regions import TEXTURES, TexturedRegion, dot_regions, legend, textured
+from .sign import framed_sign
 from .similarity import POINTS, agreement, target_of
 from .steps import background_light, composite, content_box, luminance
 from .views import views
@@ -31,7 +33,7 @@ __all__ = ["PICTURES_VERSION", "FrameReport", "PictureReport", "PictureScene", "
 
 Floats = NDArray[np.float64]
 
-PICTURES_VERSION = 1
+PICTURES_VERSION = 2
 """One more whenever a picture gives other patterns: what was kept of icons before is not used."""
 
 PIXELS_PER_ACTUATOR = 12
@@ -50,6 +52,7 @@ class FrameReport:
     similarity : of the frame's dots (or levels) with the figure, at most 1 (see `encoders.picture_similarity`).
     candidates : good on/off patterns of the figure, best first.
     regions : of a texture, else empty.
+    doubt : why its dots may not be known, in one sentence; empty where nothing speaks against them.
     figure : float64, shape (4 rows, 4 cols), read-only, 0..1: the figure as the best candidate's window cuts it out.
     """
 
@@ -59,6 +62,12 @@ class FrameReport:
     candidates: tuple[Candidate, ...]
     figure: Floats
     regions: tuple[TexturedRegion, ...] = ()
+    doubt: str = ""
+
+    @property
+    def legend(self) -> tuple[str, ...]:
+        """What each region of a texture is and feels like, in words."""
+        return legend(self.regions)
 
 
 @dataclass(frozen=True)
@@ -143,8 +152,20 @@ def encode_picture(
         for page, one in enumerate(made)
     )
     reports = tuple(one.report for one in made)
-    report = PictureReport(picture.name, picture.kind, picture.size, options.style, picture.notes, reports)
+    notes = (*picture.notes, *_cut(picture, reports[0].candidates[0].window, options))
+    report = PictureReport(picture.name, picture.kind, picture.size, options.style, notes, reports)
     return PictureScene(shape, frames, _encoding(picture, options), report=report)
+
+
+def _cut(picture: Picture, window: Window, options: PictureOptions) -> tuple[str, ...]:
+    """What `cover` leaves out, as a note."""
+    if options.fit is not Fit.COVER:
+        return ()
+    height, width = picture.frames[0].light.shape[:2]
+    down = max(0.0, min(window.bottom, height) - max(window.top, 0))
+    across = max(0.0, min(window.right, width) - max(window.left, 0))
+    percent = round(100 * (1 - down * across / (height * width)))
+    return (f"cover cuts {percent} % of the picture away, contain shows all of it",) if percent else ()
 
 
 def explain_picture(
@@ -199,24 +220,46 @@ def _frames(picture: Picture, shape: GridShape, options: PictureOptions) -> Iter
         high, wide = plain_size(plain[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
         pixels_per_m = (high * wide / (high_m * wide_m)) ** 0.5
         steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m)
-        yield replace(
-            _viewed(steps, "overview", _windows(steps, shape, options), shape, options), seconds=raster.seconds
-        )
+        made = _viewed(steps, "overview", _window(steps, shape, options), shape, options)
+        if options.crop and options.invert is Invert.AUTO:
+            made = _unframed(made, steps, shape, options)
+        yield replace(made, report=_doubted(made, picture.notes, options), seconds=raster.seconds)
         parts = views(height, width, wide_m / high_m, options.zoom, options.overlap)[1:]
         if parts:
             steps = plain + spaced_steps(plain[-1].image, options, pixels_per_m / options.zoom)
         for view in parts:
-            windows = [Window(view.top, view.bottom, view.left, view.right)]
-            yield replace(_viewed(steps, view.name, windows, shape, options), seconds=raster.seconds)
+            window = Window(view.top, view.bottom, view.left, view.right)
+            yield replace(_viewed(steps, view.name, window, shape, options), seconds=raster.seconds)
 
 
-def _windows(steps: list[Step], shape: GridShape, options: PictureOptions) -> list[Window]:
-    return choose_windows(steps[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+def _doubted(made: _Made, notes: tuple[str, ...], options: PictureOptions) -> FrameReport:
+    """The report of an overview, with what speaks against it."""
+    bright = next(step.image for step in made.steps if step.name == "luminance")
+    best = made.report.candidates[0]
+    doubt = doubt_of(bright, made.steps[-1].image, best.dots, best.similarity, notes, options.style is Style.ICON)
+    return replace(made.report, doubt=doubt)
 
 
-def _viewed(steps: list[Step], view: str, windows: list[Window], shape: GridShape, options: PictureOptions) -> _Made:
+def _unframed(made: _Made, steps: list[Step], shape: GridShape, options: PictureOptions) -> _Made:
+    """The sign alone where the grid is too coarse to show anything of it inside its tile or ring."""
+    framed = framed_sign(steps[-1].image)
+    if framed is None:
+        return made
+    best = made.report.candidates[0]
+    inside = _dot_means(sampled(framed.inside.astype(np.float32), [best.window], shape)[0], shape) >= 0.5
+    if len(np.unique(best.dots[inside])) > 1:
+        return made
+    steps = [*steps, Step("sign without its frame", framed.sign)]
+    return _viewed(steps, "overview", _window(steps, shape, options), shape, options)
+
+
+def _window(steps: list[Step], shape: GridShape, options: PictureOptions) -> Window:
+    return choose_window(steps[-1].image, shape, options.fit or Fit.CONTAIN, options.pitch_m, bool(options.crop))
+
+
+def _viewed(steps: list[Step], view: str, window: Window, shape: GridShape, options: PictureOptions) -> _Made:
     figure = steps[-1].image
-    fitted = best_patterns(figure, windows, shape, options.candidates)
+    fitted = best_patterns(figure, window, shape, options.candidates)
     best = fitted.candidates[0]
     similarity, regions = best.similarity, tuple[TexturedRegion, ...]()
     if options.output is Output.LEVELS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ..scene import PatternKind
 from .steps import luminance
 
-__all__ = ["TEXTURES", "Direction", "Texture", "TexturedRegion", "dot_regions", "textured"]
+__all__ = ["TEXTURES", "Direction", "Texture", "TexturedRegion", "dot_regions", "legend", "textured"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -61,6 +62,31 @@ class TexturedRegion:
     colour: tuple[float, float, float]
     dots: int
     texture: Texture | None
+
+
+def legend(regions: Sequence[TexturedRegion]) -> tuple[str, ...]:
+    """What each region feels like, in words, one clause each: size, brightness, texture."""
+    whole = max(1, sum(region.dots for region in regions))
+    return tuple(
+        f"{100 * region.dots / whole:.0f} % {_brightness(region)}: {_feel(region.texture)}" for region in regions
+    )
+
+
+def _brightness(region: TexturedRegion) -> str:
+    # As seen: the cube root of light is about linear in what is called half as bright.
+    seen = float(np.cbrt(luminance(np.array(region.colour, np.float32))))
+    return next(word for limit, word in ((0.4, "dark"), (0.7, "middling"), (np.inf, "bright")) if seen < limit)
+
+
+def _feel(texture: Texture | None) -> str:
+    if texture is None:
+        return "flat"
+    way = "along the rows" if texture.direction is Direction.ALONG else "down the columns"
+    strength = f" at {100 * texture.level:.0f} %" if texture.level < 1 else ""
+    if texture.kind is PatternKind.BARS:
+        return f"bars {way}, {texture.bar} wide{strength}"
+    lag = np.degrees(texture.lag_rad)
+    return f"all together{strength}" if lag < 1 else f"a wave {way}, {lag:.0f} degrees a dot{strength}"
 
 
 # Neighbours in the list differ in at least two of kind, direction and lag, and levels are 3 dB apart or equal.

@@ -1,15 +1,17 @@
 """How alike a pattern of dots and a picture are, as one number.
 
-Between dots the finger feels the sum of their neighbourhoods, so a pattern p is drawn up to U = sum_i p_i k(x - x_i),
-with k the product of two tents that fall to 0 at the next dot (bilinear up-sampling), and compared with the figure T on
-a lattice of 4 x 4 points an actuator. Points count w(x) = 1 + |grad T|/max |grad T|: the outline counts twice. The
-similarity is
+A finger does not feel the outline of single dots, so a pattern p is drawn with a square for each dot and, like the
+figure T, blurred by a Gaussian f with a standard deviation of half an actuator; both are compared on a lattice of
+4 x 4 points an actuator. The similarity of U = f * sum_i p_i square(x - x_i) and V = f * T is
 
-    S = 1/2 corr_w(U, T) + 1/2 corr_w(U - g*U, T - g*T),
+    S = 1/2 corr(U, V) + 1/2 corr(U - g*U, V - g*V),
 
-with corr_w the weighted correlation coefficient and g a Gaussian with a standard deviation of 1.5 actuators: the first
-half asks for the right masses, the second for the right structure beside one another (holes, gaps, strokes). It is at
-most 1, does not change when the figure becomes fainter, and is negative for the inverse picture.
+with corr the correlation coefficient and g a Gaussian with a standard deviation of two actuators: the first half asks
+for the right masses, the second for the right structure beside one another (holes, gaps, strokes). It is at most 1,
+does not change when the figure becomes fainter, and is negative for the inverse picture.
+
+All points weigh the same, so each half is c.p / sqrt(p.M.p) with an M that hangs on the grid alone. That is what makes
+the search quick.
 """
 
 from __future__ import annotations
@@ -23,13 +25,29 @@ from numpy.typing import NDArray
 
 from ..scene import GridShape
 
-__all__ = ["POINTS", "Quadratic", "Slope", "Target", "agreement", "quadratics", "similarities", "slopes", "target_of"]
+__all__ = [
+    "DENSE_DOTS",
+    "POINTS",
+    "SHARES",
+    "Target",
+    "agreement",
+    "matrices",
+    "pulls",
+    "ratio",
+    "similarities",
+    "squares",
+    "target_of",
+]
 
 Floats = NDArray[np.float64]
 
 POINTS = 4
-SURROUND = 1.5
+BLUR = 0.5
+SURROUND = 2.0
 SHARES = (0.5, 0.5)
+DENSE_DOTS = 144
+"""Grids of more dots have no matrix M; products with it are worked out along rows and columns."""
+
 FLAT = 1e-9
 FAINT = 0.1
 RIPPLE = 0.05
@@ -43,94 +61,66 @@ class Target:
     ----------
     shape : the grid.
     figure : float64, shape (K, 4 rows, 4 cols), 0..1.
-    weight : the same shape, sum 1 for each.
     flat : bool, shape (K,), filled or empty throughout, so that a correlation says nothing.
-    centred : for each half of the measure the figure less its weighted mean, over its weighted standard
-        deviation, times the weight; zero where the figure is flat.
+    linear : for each half of the measure its c, float64, shape (K, rows * cols); zero where the figure is flat.
     """
 
     shape: GridShape
     figure: Floats
-    weight: Floats
     flat: NDArray[np.bool_]
-    centred: tuple[Floats, ...]
+    linear: tuple[Floats, ...]
 
     def __getitem__(self, index: int) -> Target:
         """One of the figures, as a target with K = 1."""
         one = slice(index, index + 1)
-        halves = tuple(half[one] for half in self.centred)
-        return Target(self.shape, self.figure[one], self.weight[one], self.flat[one], halves)
-
-
-@dataclass(frozen=True)
-class Quadratic:
-    """One half of the measure as a function of the dots: share (c.p)/sqrt(p.M.p).
-
-    Attributes
-    ----------
-    share : its part of the whole.
-    linear : float64, shape (n,).
-    matrix : float64, shape (n, n).
-    """
-
-    share: float
-    linear: Floats
-    matrix: Floats
-
-
-@dataclass(frozen=True)
-class Slope:
-    """One half of the measure around one pattern, for grids of any size.
-
-    With c and M of `Quadratic`: top = c.p, square = p.M.p, and as arrays of shape (rows, cols) linear = c,
-    pull = M p and diagonal = diag M.
-    """
-
-    share: float
-    top: float
-    square: float
-    linear: Floats
-    pull: Floats
-    diagonal: Floats
+        return Target(self.shape, self.figure[one], self.flat[one], tuple(half[one] for half in self.linear))
 
 
 @dataclass(frozen=True)
 class _Lattice:
-    tents: tuple[Floats, Floats]
-    blurs: tuple[Floats, Floats]
+    """Along rows and along columns: dots drawn as blurred squares, the figure's blur, and the surroundings."""
+
+    drawn: tuple[Floats, Floats]
+    soft: tuple[Floats, Floats]
+    around: tuple[Floats, Floats]
 
 
 @lru_cache(maxsize=16)
 def _lattice(shape: GridShape) -> _Lattice:
-    tents, blurs = [], []
+    drawn, soft, around = [], [], []
     for count in (shape.rows, shape.cols):
-        points = (np.arange(count * POINTS) + 0.5) / POINTS
-        tents.append(np.clip(1 - np.abs(points[:, None] - (np.arange(count) + 0.5)), 0, 1))
-        blur = np.exp(-(((points[:, None] - points) / SURROUND) ** 2) / 2)
-        blurs.append(blur / blur.sum(axis=1, keepdims=True))
-    return _Lattice((tents[0], tents[1]), (blurs[0], blurs[1]))
+        blur = _gauss(count, BLUR)
+        soft.append(blur)
+        around.append(_gauss(count, SURROUND))
+        drawn.append(blur @ np.kron(np.eye(count), np.ones((POINTS, 1))))
+    return _Lattice((drawn[0], drawn[1]), (soft[0], soft[1]), (around[0], around[1]))
+
+
+def _gauss(count: int, sigma: float) -> Floats:
+    points = (np.arange(count * POINTS) + 0.5) / POINTS
+    bell = np.exp(-(((points[:, None] - points) / sigma) ** 2) / 2)
+    shares: Floats = bell / bell.sum(axis=1, keepdims=True)
+    return shares
 
 
 def target_of(figure: Floats, shape: GridShape) -> Target:
-    """Weights and moments of figures, so that many patterns can be compared with them.
+    """What many patterns can be compared with.
 
     Parameters
     ----------
     figure : float64, shape (K, 4 rows, 4 cols), 0..1.
     """
     figure = np.asarray(figure, np.float64)
-    outline = _outline(figure)
-    top = outline.max(axis=(1, 2), keepdims=True, initial=0.0)
-    weight = 1 + outline / np.maximum(top, FLAT)
-    weight /= weight.sum(axis=(1, 2), keepdims=True)
-    centred = []
-    for half in _halves(figure, _lattice(shape)):
-        less = half - (weight * half).sum(axis=(1, 2), keepdims=True)
-        variance = (weight * less**2).sum(axis=(1, 2), keepdims=True)
-        centred.append(np.where(variance > FLAT, weight * less / np.sqrt(np.maximum(variance, FLAT)), 0.0))
+    lattice = _lattice(shape)
+    linear = []
+    for half, fine in _halves(lattice.soft[0] @ figure @ lattice.soft[1].T, lattice):
+        less = half - half.mean(axis=(1, 2), keepdims=True)
+        spread = np.sqrt((less**2).mean(axis=(1, 2), keepdims=True))
+        unit = np.where(spread > FLAT**0.5, less / np.maximum(spread, FLAT), 0.0)
+        linear.append(_back(unit, fine, lattice).reshape(len(figure), -1))
     filled = (figure.std(axis=(1, 2)) < FAINT) & (figure.mean(axis=(1, 2)) > 0.5)
     flat = filled | (np.ptp(figure, axis=(1, 2)) < RIPPLE)
-    return Target(shape, figure, weight, flat, tuple(centred))
+    return Target(shape, figure, flat, tuple(linear))
 
 
 def agreement(target: Target, dots: Floats) -> Floats:
@@ -147,17 +137,18 @@ def agreement(target: Target, dots: Floats) -> Floats:
     """
     dots = np.asarray(dots, np.float64)
     dots = dots[None] if dots.ndim == 3 else dots
-    lattice = _lattice(target.shape)
-    rows, cols = lattice.tents
+    flat = dots.reshape(*dots.shape[:2], -1)
     total = np.zeros(dots.shape[:2])
-    for share, half, centred in zip(SHARES, _halves(rows @ dots @ cols.T, lattice), target.centred, strict=True):
-        weight = target.weight[:, None]
-        mean = (weight * half).sum(axis=(2, 3))
-        variance = (weight * half**2).sum(axis=(2, 3)) - mean**2
-        covariance = (centred[:, None] * half).sum(axis=(2, 3))
-        total += np.where(variance > FLAT, share * covariance / np.sqrt(np.maximum(variance, FLAT)), 0.0)
+    for share, linear, pull in zip(SHARES, target.linear, pulls(target.shape, flat), strict=True):
+        total += share * ratio((linear[:, None] * flat).sum(axis=2), (flat * pull).sum(axis=2))
     apart = np.abs(dots - target.figure.mean(axis=(1, 2))[:, None, None, None]).mean(axis=(2, 3))
     return np.where(target.flat[:, None], 1 - apart, total)
+
+
+def ratio(top: Floats, square: Floats) -> Floats:
+    """One half of the measure; 0 where the pattern is flat."""
+    found: Floats = np.where(square > FLAT, top / np.sqrt(np.maximum(square, FLAT)), 0.0)
+    return found
 
 
 def similarities(figure: Floats, amplitudes: Floats) -> Floats:
@@ -173,74 +164,63 @@ def similarities(figure: Floats, amplitudes: Floats) -> Floats:
     return found
 
 
-def quadratics(target: Target) -> list[Quadratic]:
-    """The measure for the first figure of a target in closed form, for grids of some hundred dots."""
-    weight = target.weight[0].ravel()
+def pulls(shape: GridShape, dots: Floats) -> list[Floats]:
+    """M p of each half for patterns of shape (..., rows * cols); the same shape."""
+    if shape.rows * shape.cols <= DENSE_DOTS:
+        return [dots @ matrix for matrix in matrices(shape)]
+    lattice = _lattice(shape)
+    rows, cols = lattice.drawn
     found = []
-    for share, basis, centred in zip(SHARES, _bases(target.shape), target.centred, strict=True):
-        mean = basis @ weight
-        matrix = _product(basis * weight, basis) - np.outer(mean, mean)
-        found.append(Quadratic(share, basis @ centred[0].ravel(), matrix))
-    return found
-
-
-def _product(left: Floats, right: Floats) -> Floats:
-    """left @ right.T in pieces: small products stay on one core, so that a worker on each core is not in the way."""
-    points = left.shape[1]
-    piece = points if points > 1024 else points // 4
-    stacked = [values.reshape(len(values), -1, piece).transpose(1, 0, 2) for values in (left, right)]
-    total: Floats = (stacked[0] @ stacked[1].transpose(0, 2, 1)).sum(axis=0)
-    return total
-
-
-def slopes(target: Target, dots: Floats) -> list[Slope]:
-    """The measure for the first figure of a target around a pattern of shape (rows, cols)."""
-    lattice = _lattice(target.shape)
-    rows, cols = lattice.tents
-    blurred = lattice.blurs[0] @ rows, lattice.blurs[1] @ cols
-    weight = target.weight[0]
-    found = []
-    drawn = rows @ dots @ cols.T
-    for share, half, centred, fine in zip(SHARES, _halves(drawn, lattice), target.centred, (0.0, 1.0), strict=True):
-
-        def back(values: Floats, left: Floats = rows, right: Floats = cols) -> Floats:
-            return left.T @ values @ right
-
-        def onto(values: Floats, fine: float = fine) -> Floats:
-            return back(values) - fine * back(values, *blurred)
-
-        squares = back(weight, rows**2, cols**2)
-        if fine:
-            squares += back(weight, blurred[0] ** 2, blurred[1] ** 2)
-            squares -= 2 * back(weight, rows * blurred[0], cols * blurred[1])
-        less = half - (weight * half).sum()
-        mean = onto(weight)
-        top, square = float((centred[0] * half).sum()), float((weight * less**2).sum())
-        found.append(Slope(share, top, square, onto(centred[0]), onto(weight * less), squares - mean**2))
+    for half, fine in _halves(rows @ dots.reshape(*dots.shape[:-1], shape.rows, shape.cols) @ cols.T, lattice):
+        found.append(_back(half - half.mean(axis=(-2, -1), keepdims=True), fine, lattice).reshape(dots.shape))
     return found
 
 
 @lru_cache(maxsize=16)
-def _bases(shape: GridShape) -> tuple[Floats, ...]:
-    """What each dot adds to each half of the measure; float64, shape (dots, points)."""
+def matrices(shape: GridShape) -> tuple[Floats, ...]:
+    """M of each half; float64, shape (dots, dots)."""
     lattice = _lattice(shape)
-    rows, cols = lattice.tents
+    rows, cols = lattice.drawn
     drawn = np.einsum("yr,xc->rcyx", rows, cols).reshape(shape.rows * shape.cols, len(rows), len(cols))
-    return tuple(np.ascontiguousarray(half.reshape(len(half), -1)) for half in _halves(drawn, lattice))
+    found = []
+    for half, _ in _halves(drawn, lattice):
+        less = (half - half.mean(axis=(1, 2), keepdims=True)).reshape(len(half), -1)
+        found.append(less @ less.T / less.shape[1])
+    return tuple(found)
 
 
-def _halves(values: Floats, lattice: _Lattice) -> Iterator[Floats]:
-    rows, cols = lattice.blurs
-    yield values
-    yield values - rows @ values @ cols.T
+@lru_cache(maxsize=16)
+def squares(shape: GridShape) -> tuple[Floats, ...]:
+    """The diagonal of M of each half; float64, shape (rows * cols,)."""
+    if shape.rows * shape.cols <= DENSE_DOTS:
+        return tuple(np.diag(matrix).copy() for matrix in matrices(shape))
+    lattice = _lattice(shape)
+    far = [around @ drawn for around, drawn in zip(lattice.around, lattice.drawn, strict=True)]
+    found = []
+    for fine in (0.0, 1.0):
+        sides = [
+            [(drawn**2).sum(axis=0), (drawn * blurred).sum(axis=0), (blurred**2).sum(axis=0), drawn.sum(axis=0)
+             , blurred.sum(axis=0)]
+            for drawn, blurred in zip(lattice.drawn, far, strict=True)
+        ]  # fmt: skip
+        own, across, beyond, mass, far_mass = (np.outer(down, right) for down, right in zip(*sides, strict=True))
+        size = len(lattice.drawn[0]) * len(lattice.drawn[1])
+        mean = (mass - fine * far_mass) / size
+        found.append(((own - fine * 2 * across + fine * beyond) / size - mean**2).ravel())
+    return tuple(found)
 
 
-def _outline(figure: Floats) -> Floats:
-    """Size of the gradient over three points, shape (K, height, width); the border is repeated."""
-    wide = np.pad(figure, ((0, 0), (1, 1), (1, 1)), mode="edge")
-    down = wide[:, 2:] - wide[:, :-2]
-    right = wide[:, :, 2:] - wide[:, :, :-2]
-    down = down[:, :, :-2] + 2 * down[:, :, 1:-1] + down[:, :, 2:]
-    right = right[:, :-2] + 2 * right[:, 1:-1] + right[:, 2:]
-    size: Floats = np.hypot(down, right)
-    return size
+def _halves(values: Floats, lattice: _Lattice) -> Iterator[tuple[Floats, bool]]:
+    """What each half of the measure compares, and whether it is without its surroundings."""
+    rows, cols = lattice.around
+    yield values, False
+    yield values - rows @ values @ cols.T, True
+
+
+def _back(values: Floats, fine: bool, lattice: _Lattice) -> Floats:
+    """The mean over the lattice of values times what each dot adds to a half; shape (..., rows, cols)."""
+    if fine:
+        rows, cols = lattice.around
+        values = values - rows.T @ values @ cols
+    found: Floats = lattice.drawn[0].T @ values @ lattice.drawn[1] / (values.shape[-1] * values.shape[-2])
+    return found

@@ -21,9 +21,6 @@ Floats = NDArray[np.float32]
 Bools = NDArray[np.bool_]
 
 WEIGHTS = np.array([0.2126, 0.7152, 0.0722], np.float32)
-SIDE_SHARE = 0.45
-PLATE_SHARE = 0.65
-HOLE_SHARES = (0.03, 0.33)
 
 
 def background_light(light: Floats, background: str) -> Floats:
@@ -134,35 +131,15 @@ def adaptive_figure(values: Floats, radius: int) -> Floats:
 
 
 def inverted(figure: Floats, clear: Bools | None = None) -> Floats:
-    """Raise the figure: turned over when the ground is mostly raised, and so that a plate raises what is cut into it.
+    """Raise the figure: turned over when the ground is mostly raised.
 
     The ground is what is `clear` (transparent in the picture; bool, same shape), or when None the border.
-
-    A plate fills most of its box, touches each side of it in one long run, and has holes: an icon on a tile.
     """
     border = [figure[0], figure[-1], figure[:, 0], figure[:, -1]]
     ground = np.concatenate(border) if clear is None else figure[clear]
     if float(ground.mean()) > 0.5:
         figure = 1 - figure
-    top, bottom, left, right = content_box(figure)
-    inner = figure[top:bottom, left:right]
-    if min(inner.shape) < 8 or float(inner.mean()) < PLATE_SHARE:
-        return figure
-    rim = int(0.12 * min(inner.shape))
-    core = 1 - inner[rim : -rim or None, rim : -rim or None]
-    share = float(core.sum()) / inner.size
-    sides = inner[1], inner[-2], inner[:, 1], inner[:, -2]
-    if not HOLE_SHARES[0] < share < HOLE_SHARES[1] or not all(_one_run(side >= 0.5) for side in sides):
-        return figure
-    plate = np.zeros_like(figure)
-    plate[top + rim : bottom - rim, left + rim : right - rim] = core
-    return plate
-
-
-def _one_run(side: Bools) -> bool:
-    """Whether the true places are one run that covers a good part of the side."""
-    starts = np.count_nonzero(np.diff(side.astype(np.int8), prepend=0) > 0)
-    return starts == 1 and float(side.mean()) >= SIDE_SHARE
+    return figure
 
 
 def content_box(figure: Floats) -> tuple[int, int, int, int]:

@@ -153,11 +153,11 @@ class Adaptation:
 
     def report(self) -> AdaptationReport:
         """How it went so far."""
-        told = self._known.told[:, [0, 3]].any(axis=1)
+        told = np.any(self._known.told[:, [0, 3]], axis=1)
         if self._bias is not None:
-            told |= self._bias.told
+            told = told | self._bias.told
         strange = tuple(divmod(int(at), self._device.cols) for at in np.flatnonzero(self._known.strange))
-        return AdaptationReport(tuple(self._errors), int(told.sum()), len(told), self._limited, self._touched, strange)
+        return AdaptationReport(tuple(self._errors), int(told.sum()), told.size, self._limited, self._touched, strange)
 
     def _holding(self, frame: FramePlan) -> tuple[FramePlan, Held]:
         assert self._bias is not None

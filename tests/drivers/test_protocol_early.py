@@ -224,7 +224,15 @@ def test_what_was_kept_is_checked_at_its_turn() -> None:
 
 
 def test_the_oldest_host_gets_the_oldest_ack() -> None:
-    for version, spoken, length in ((0, 1, 58), (1, 1, 58), (2, 2, 62), (3, VERSION, 62), (65535, VERSION, 62)):
+    for version, spoken, length in (
+        (0, 1, 58),
+        (1, 1, 58),
+        (2, 2, 62),
+        (3, 3, 62),
+        (4, 4, 62),
+        (5, VERSION, 62),
+        (65535, VERSION, 62),
+    ):
         controller = VirtualController(SPEC, now=0.0)
         answers = send(controller, 0.0, Packet(Kind.HELLO, 0, version.to_bytes(2, "little")), Packet(Kind.STATUS))
         assert Capabilities.of(answers[0]).version == spoken
@@ -255,7 +263,9 @@ class OldController:
                 )  # fmt: skip
                 self.out += encode(numbers.packet())
             elif packet.kind is Kind.START and packet.number == 0:
-                self.session, self.next = self.session or StartMessage.of(packet).session, max(self.next, 1)
+                start = StartMessage.of(packet)
+                assert start is not None
+                self.session, self.next = self.session or start.session, max(self.next, 1)
             elif packet.kind in (Kind.SAMPLES, Kind.END, Kind.MARK):
                 self.gap = self.gap or packet.number > self.next
                 if packet.number == self.next:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from drivers import CouplingEvent, DriverError, LimitCheck, LimitError, Waveform, WaveformError, channels_of
 from drivers.waveform.coupling import CouplingWriter, LamTrack
-from drivers.waveform.timeline import PlacedFrame
+from drivers.waveform.sampling import volts_of
 from encoders import Frame, TargetPattern
 from planner import FirstOrderHold, FramePlan, Margins, OperatingPoint, Plan, Ramp
 from tests.support.known import known
@@ -169,9 +169,8 @@ def test_the_hundredth_hour_is_as_exact_as_the_first_second() -> None:
     held = state(device, 0.05, omega=1.25)
     long = frame(device, 0.0, 0.05, [held])
     late = replace(long, start_s=0.0, settled_s=0.0, end_s=360000.0)
-    waveform = Waveform.of(Plan(device, [late], {}))
     index = np.arange(360000 * 8000 - 500, 360000 * 8000)
-    got = waveform._chunk(PlacedFrame(late, 0, 360000 * 8000), index)[0]
+    got = volts_of(device, late, index)[0]
     # The phase in whole cycles, in integers: f = 133.13 * 1.25 Hz = 1664125 / 10^4.
     cycles = (index.astype(object) * 1664125 % (10**4 * 8000)).astype(float) / (10**4 * 8000)
     gain = FirstOrderHold.of(1.25, device.tau_per_s / 8000).gain

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from encoders import GoesOn, GridShape, LayoutError, join_pages
+from encoders.braille.filling import paginate
 from encoders.braille.joining import unmarked
-from encoders.braille.layout import NARROW, Cut, Layout, PlacedWord, cut_anywhere, paginate
+from encoders.braille.layout import NARROW, Cut, Layout, PlacedWord, cut_anywhere
 
 # Blank-free cells with many hyphens, the one cell that is special.
 WORD = st.text(st.sampled_from("⠁⠃⠤"), min_size=1, max_size=30)
@@ -21,7 +22,7 @@ def words_of(cells: list[str], glued: Collection[int] = frozenset()) -> list[Pla
             at += 1
         placed.append(PlacedWord(word, word, at, at + len(word), None, at, 0, joined))
         at += len(word)
-    return [*placed, PlacedWord("", "", at, at, None, 0, 0, False)]
+    return placed
 
 
 def every_other(layout: Layout):

@@ -88,7 +88,7 @@ def test_capitals_of_several_words_are_marked_on_each_small_page_and_once_on_a_l
     text = "THE OLD CLOCK"
     assert [frame.cells[:2] for frame in pages_of(text)] == ["⠠⠠"] * 4
     (large,) = pages_of(text, shape=WIDE)
-    assert large.cells.startswith("⠠⠠⠠⠮⠀⠕⠇⠙⠀")
+    assert large.cells.startswith("⠀⠀⠠⠠⠠⠮⠀⠕⠇⠙⠀")
     assert encode_text(text, GRID, TextOptions()).text_frames.check().ok
 
 
@@ -112,6 +112,21 @@ def test_a_page_that_lost_its_number_sign_is_found_and_named():
     assert check.sentence.endswith("Pages that read alone say something else: 1.")
     (wrong,) = check.alone
     assert wrong.sentence == "page 3: '199' read alone is 'aii'"
+
+
+def test_a_german_address_is_read_by_what_follows_on_the_next_pages():
+    text = "die Datei /etc/mdadm/mdadm.conf, die Option --create und --fail"
+    scene = encode_text(text, GRID, TextOptions(table="de-g2.ctb"))
+    check = scene.text_frames.check()
+    assert check.cells_equal
+    assert check.alone == ()
+    frames = list(scene.frames)
+    place = next(number for number, frame in enumerate(frames) if frame.text == "c/")
+    pages = [FeltPage(frame.cells, frame.text, frame.goes_on) for frame in frames]
+    # Without its indicator the same part is a word, whatever follows.
+    assert pages[place].cells.startswith("⠠⠨⠉")
+    pages[place] = pages[place]._replace(cells="⠉⠲⠈\n⠀⠀⠀")
+    assert [one.page for one in back_check(pages, text, scene.encoding).alone] == [place]
 
 
 def test_manifests_of_old_are_joined_by_their_dots():

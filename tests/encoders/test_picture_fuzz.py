@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import resource
 import sys
@@ -94,6 +95,8 @@ class Calls:
 
 def feed(count: int, seed: int) -> tuple[int, int]:
     """Encode mutated files; how many made a scene, and how many were refused."""
+    # Loading it is no work of a picture's.
+    importlib.import_module("scipy.ndimage")
     made = refused = 0
     for data in mutated(count, seed):
         refusal, calls = "", Calls()

@@ -50,10 +50,10 @@ def test_a_scene_of_one_frame() -> None:
 
 
 def test_what_a_finger_should_find() -> None:
-    assert drawn(encode_picture(HEART, SIX)) == ["......", "######", "######", ".####.", "..##..", "......"]
-    pause = ["##..##"] * 6
+    assert drawn(encode_picture(HEART, SIX)) == [".#..#.", "######", "######", ".####.", "..##..", "......"]
+    pause = [".#..#."] * 6
     assert drawn(encode_picture(SAMPLES / "icons" / "pause.svg", SIX)) == pause
-    assert drawn(encode_picture(bars(0, 1, 4, 5), SIX)) == pause
+    assert drawn(encode_picture(bars(0, 1, 4, 5), SIX)) == ["##..##"] * 6
 
 
 @pytest.mark.parametrize("kind", ["PNG", "GIF", "BMP", "TIFF", "WEBP"])
@@ -101,7 +101,7 @@ def test_crop_and_fit() -> None:
     image.paste(bars(0, 1, 4, 5).convert("L"), (50, 30))
     assert drawn(encode_picture(image, SIX)) == ["##..##"] * 6
     assert drawn(encode_picture(image, SIX, PictureOptions(crop=False, style=Style.ICON))) != ["##..##"] * 6
-    wide = bars(0, 1, 4, 5).resize((320, 80))
+    wide = bars(0, 1, 4, 5).resize((480, 80))
     with pytest.raises(EmptyPicture):
         encode_picture(wide, SIX, PictureOptions(fit=Fit.COVER, style=Style.ICON, crop=False))
     middle = bars(3).resize((320, 80))
@@ -110,6 +110,21 @@ def test_crop_and_fit() -> None:
     )
     assert drawn(encode_picture(wide, SIX, PictureOptions(fit=Fit.STRETCH))) == ["##..##"] * 6
     assert drawn(encode_picture(wide, SIX, PictureOptions(fit=Fit.CONTAIN, style=Style.ICON)))[0] == "......"
+
+
+def test_a_tile_is_dropped_only_where_it_hides_its_sign() -> None:
+    """A plus cut out of a tile: wide arms are shown in the tile, thin ones by themselves."""
+    found = []
+    for width in (16, 2):
+        tile = Image.new("L", (96, 96), 255)
+        ImageDraw.Draw(tile).rectangle((6, 6, 89, 89), fill=0)
+        for box in ((48 - width / 2, 24, 47 + width / 2, 71), (24, 48 - width / 2, 71, 47 + width / 2)):
+            ImageDraw.Draw(tile).rectangle(box, fill=255)
+        found.append(drawn(encode_picture(tile, SIX)))
+    assert found[0][0] == "######"
+    assert "##..##" in found[0]
+    assert found[1][0] == "..##.."
+    assert found[1][2] == "######"
 
 
 def test_the_true_pitch_is_used() -> None:
@@ -183,7 +198,7 @@ def test_explain_shows_each_step_as_a_picture() -> None:
         == encode_picture(SAMPLES / "photos" / "ball.jpg", SIX).report.frames[0].steps
     )
     assert [step.name for step in steps] == [
-        "composite", "luminance", "local contrast", "threshold (otsu)", "invert", "fit (cover)", "on/off",
+        "composite", "luminance", "local contrast", "threshold (otsu)", "invert", "fit (contain)", "on/off",
     ]  # fmt: skip
     for step in steps:
         assert step.image.dtype == np.float32
@@ -219,3 +234,24 @@ def test_samples_are_small_and_written_by_their_script(tmp_path: Path) -> None:
     files = [*(SAMPLES / "textures").iterdir(), *(SAMPLES / "photos").iterdir()]
     assert len(files) == 5
     assert all(file.stat().st_size < 100_000 for file in files)
+
+
+def test_a_photograph_is_shown_whole_and_what_is_cut_is_said() -> None:
+    wide = GridShape(10, 24)
+    path = SAMPLES / "photos" / "lighthouse.jpg"
+    whole, cut = (encode_picture(path, wide, PictureOptions(fit=fit)).report for fit in (None, Fit.COVER))
+    height, width = whole.size
+    window = cut.frames[0].candidates[0].window
+    share = (window.bottom - window.top) * (window.right - window.left) / (height * width)
+    assert whole.notes == ()
+    (note,) = cut.notes
+    assert note.startswith(f"cover cuts {round(100 * (1 - share))} % of the picture away")
+
+
+def test_a_texture_has_a_legend_in_words() -> None:
+    scene = encode_picture(SAMPLES / "textures" / "fields.png", SIX, PictureOptions(output=Output.TEXTURE))
+    report = scene.report.frames[0]
+    assert len(report.legend) == len(report.regions)
+    assert any(line.endswith(": all together") for line in report.legend)
+    assert sum(int(line.split(" ")[0]) for line in report.legend) == pytest.approx(100, abs=2)
+    assert encode_picture(HEART, SIX).report.frames[0].legend == ()

@@ -14,6 +14,7 @@ from encoders.picture.errors import PictureError
 from encoders.picture.figure import figure_steps, style_of
 from encoders.picture.options import Fit, Invert, PictureOptions, Style, Threshold
 from encoders.picture.regions import TEXTURES, dot_regions, textured
+from encoders.picture.sign import framed_sign
 from encoders.picture.steps import (
     adaptive_figure,
     background_light,
@@ -134,16 +135,21 @@ def test_what_is_transparent_is_ground() -> None:
     np.testing.assert_array_equal(inverted(figure, clear), figure)
 
 
-def test_an_icon_on_a_tile_is_raised_without_the_tile() -> None:
+def test_a_sign_in_a_tile_and_in_a_ring_is_known() -> None:
     tile = square(48, 4, 44)
     tile[16:32, 22:26] = 0
-    raised = inverted(tile)
-    np.testing.assert_array_equal(raised, square(48, 0, 0) + np.pad(np.ones((16, 4)), ((16, 16), (22, 22))))
-    ring = square(48, 4, 44) - square(48, 12, 36)
-    bars = square(48, 4, 44)
-    bars[:, 18:30] = 0
-    for kept in (ring, bars, square(48, 4, 44)):
-        np.testing.assert_array_equal(inverted(kept), kept)
+    sign = np.pad(np.ones((16, 4), np.float32), ((16, 16), (22, 22)))
+    ring = square(48, 4, 44) - square(48, 8, 40)
+    for framed in (tile, ring + sign):
+        found = framed_sign(framed)
+        assert found is not None
+        np.testing.assert_array_equal(found.sign, sign)
+        np.testing.assert_array_equal(found.inside, sign > 0)
+    notched, house = tile.copy(), tile.copy()
+    notched[4:32, 22:26] = 0
+    house[4:24] *= np.abs(np.arange(48) - 23.5) < np.arange(20)[:, None]
+    for other in (ring, square(48, 4, 44), notched, house, np.zeros((48, 48), np.float32)):
+        assert framed_sign(other) is None
 
 
 def test_content_box() -> None:

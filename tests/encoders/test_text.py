@@ -148,7 +148,7 @@ def test_times_are_checked(bad):
 def test_gaps_and_larger_grids_show_fewer_and_more_cells():
     assert all(len(frame.cells) == 2 for frame in frames_of("Hello world", cell_gap=2, line_gap=1))
     (frame,) = frames_of("Hello world", shape=GridShape(40, 96))
-    assert frame.cells.startswith("⠠⠓⠑⠇⠇⠕⠀⠸⠺⠀")
+    assert frame.cells.startswith("⠀⠀⠠⠓⠑⠇⠇⠕⠀⠸⠺⠀")
 
 
 def test_arrays_are_complex_and_read_only():

@@ -41,6 +41,7 @@ class TextSource:
     name : how the source is called in messages.
     document : where in `text` its blocks, emphases and pictures are; None of a plain text.
     emphases : (start, end, emphasis) of what is written with indicators, in order; see `encoders.Emphasis`.
+    follows : of a part that begins inside a paragraph, the white space before it, at least a blank; else empty.
     """
 
     text: str
@@ -48,6 +49,7 @@ class TextSource:
     name: str
     document: FlatDocument | None = None
     emphases: tuple[tuple[int, int, int], ...] = ()
+    follows: str = ""
 
     @classmethod
     def of_text(cls, text: str, name: str = "text") -> TextSource:
@@ -198,7 +200,11 @@ class TextSource:
         text = self.text[start:end]
         if not text.replace("\u2800", " ").strip():
             raise EmptyText(f"{self.name}: there is nothing to show in characters {start} to {end}")
-        return replace(self, text=text, document=self.document and self.document.part(start, end), emphases=())
+        head = self.text[:start].rstrip()
+        space = (self.text[len(head) : start] or " ") + text[: len(text) - len(text.lstrip())]
+        follows = space if head and not _APART.search(space) else "" if head else self.follows
+        document = self.document and self.document.part(start, end)
+        return replace(self, text=text, document=document, emphases=(), follows=follows)
 
 
 def _check_size(data: bytes, name: str) -> None:
@@ -207,5 +213,6 @@ def _check_size(data: bytes, name: str) -> None:
         raise UnsupportedSource(f"{name}: more than {MAX_BYTES} bytes; give it in parts (is this really a text?)")
 
 
+_APART = re.compile("\n[^\\S\n]*\n|[\f\u2029]")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 _NOT_BRAILLE = re.compile("[^\u2800-\u28ff\\s]")

@@ -20,7 +20,7 @@ def own(name: str) -> Iterator[tuple[str, Callable[..., object]]]:
     """A public object, and where it is a class of `dotwave` its public methods."""
     found = getattr(dotwave, name)
     yield name, found
-    if inspect.isclass(found) and found.__module__.startswith("dotwave.api"):
+    if inspect.isclass(found) and found.__module__.startswith(("dotwave.api", "dotwave.live")):
         for method, value in vars(found).items():
             if inspect.isfunction(value) and not method.startswith("_"):
                 yield f"{name}.{method}", value

@@ -18,7 +18,7 @@ from chainsim import Outcome
 from dotwave.api import plans
 from drivers import read_waveform
 from encoders.braille import text as encoder
-from encoders.braille.layout import paginate
+from encoders.braille.filling import paginate
 from planner import Plan, plan_scene
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -80,7 +80,7 @@ class Played:
             self.adaptation.learned(measured)
 
         session = HostSession(
-            lambda found: plan_messages(self.manifest, frames, found, session=7, limits=limits)
+            lambda found: plan_messages(self.manifest, frames, found, session=7, prefill_s=0.25, limits=limits)
             if adapt
             else session_messages(self.manifest, reader, found, session=7),
             session=7, timing=Timing(lead_s=0.5) if adapt else Timing(), on_measured=heard,
@@ -156,7 +156,7 @@ def messages(manifest: Manifest, plan: Plan, limits: GateLimits | None = None) -
     device = manifest.device
     found = VirtualController(ControllerSpec.of(device), now=0.0)._capabilities()
     limits = limits or GateLimits.of(device, len(manifest.channels))
-    sent = plan_messages(manifest, plan.frames, found, session=7, limits=limits)
+    sent = plan_messages(manifest, plan.frames, found, session=7, prefill_s=0.25, limits=limits)
     return np.concatenate([one.codes for one in sent if isinstance(one, SamplesMessage)])
 
 
@@ -201,5 +201,8 @@ def test_what_cannot_be_corrected_is_refused(dotwave: Callable[..., Ended], tmp_
     ended = dotwave("play", path, "--adapt")
     assert ended.code == 2
     assert "--adapt: only a controller measures what it plays; give its --port" in ended.err
+    ended = dotwave("play", path, "--adapt", "--parametric", "--port", "/dev/null")
+    assert ended.code == 2
+    assert "--adapt and --parametric: what is corrected goes out as samples" in ended.err
     with pytest.raises(EstimateError, match="its chains are ring"):
         Adaptation(load_device("paper-6x6-ring"))

@@ -80,7 +80,7 @@ def test_a_lost_worker_loses_nothing_and_nothing_is_kept_twice(cluster: Any, tmp
 
 
 def test_nobody_at_the_address_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dotwave.icon_sets.pool.CONNECT_S", 0.5)
+    monkeypatch.setattr("dotwave.cluster.CONNECT_S", 0.5)
     shutil.copy(SAMPLES / "heart.svg", tmp_path)
     with pytest.raises(AppError, match="no dask scheduler answers"):
         render_icons([str(tmp_path)], tmp_path / "out", IconOptions(scheduler="tcp://127.0.0.1:9"))

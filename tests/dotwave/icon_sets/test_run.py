@@ -133,14 +133,68 @@ def test_equal_pictures_are_told_apart_when_asked(tmp_path: Path) -> None:
     folder = tmp_path / "copies"
     folder.mkdir()
     for number in range(12):
-        shutil.copy(SAMPLES / "heart.svg", folder / f"heart{number}.svg")
+        (folder / f"heart{number}.svg").write_bytes((SAMPLES / "heart.svg").read_bytes() + b" " * number)
     plain = render_icons([str(folder)], tmp_path / "plain", ONE)
     assert plain.pairs == (66,)
-    assert plain.worked == 1
+    assert plain.worked == 12
     apart = render_icons([str(folder)], tmp_path / "apart", IconOptions(workers=1, distinct=True))
     assert apart.pairs[:2] == (0, 0)
     assert apart.neighbours == 0
     assert apart.similarity > 0.9 * plain.similarity
+
+
+@pytest.mark.parametrize("distinct", [False, True])
+def test_one_file_is_one_icon_under_however_many_names(tmp_path: Path, distinct: bool) -> None:
+    folder = tmp_path / "copies"
+    folder.mkdir()
+    for name in ("a", "b", "c"):
+        shutil.copy(SAMPLES / "heart.svg", folder / f"{name}.svg")
+    shutil.copy(SAMPLES / "sun.svg", folder)
+    report = render_icons([str(folder)], tmp_path / "out", IconOptions(workers=1, distinct=distinct))
+    assert [icon.same_as for icon in report.icons] == ["", "a.svg", "a.svg", ""]
+    assert len({icon.pattern.amplitude.tobytes() for icon in report.icons}) == 2
+    assert report.close == ()
+    assert sum(report.pairs) == 1
+    assert [icon.nearest for icon in report.icons] == ["sun.svg"] * 3 + ["a.svg"]
+
+
+def test_what_may_not_be_known_is_said(tmp_path: Path) -> None:
+    shapes = {
+        "word": "".join(f'<rect x="{8 * k}" width="5" height="12"/>' for k in range(8)),
+        "text": '<path d="M0 0h12v12h12v12H0z"/><text y="9">A</text>',
+        "line": '<rect width="60" height="3"/>',
+        "full": '<rect width="24" height="24"/><rect x="6" y="6" width="1" height="1" fill="white"/>',
+        "plain": '<path d="M0 0h12v12h12v12H0z"/>',
+    }
+    folder = tmp_path / "set"
+    folder.mkdir()
+    for name, shape in shapes.items():
+        (folder / f"{name}.svg").write_text(
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-2 -2 80 40">{shape}</svg>', encoding="utf-8"
+        )
+    report = render_icons([str(folder)], tmp_path / "out", ONE)
+    said = {Path(icon.name).stem: icon.doubt for icon in report.icons}
+    assert said["plain"] == ""
+    for name, word in (("word", "row of signs"), ("text", "text is lost"), ("line", "straight line"), ("full", "full")):
+        assert word in said[name], name
+    assert report.doubted == 4
+    assert [row["doubt"] for row in manifest(tmp_path / "out")["icons"]] == [icon.doubt for icon in report.icons]
+    assert (tmp_path / "out/index.html").read_text(encoding="utf-8").count("<strong>Doubt:</strong>") == 4
+
+
+def test_what_an_icon_font_says_of_its_icons_is_read(tmp_path: Path) -> None:
+    folder = tmp_path / "font"
+    (folder / "filled").mkdir(parents=True)
+    for name in ("heart", "sun"):
+        shutil.copy(SAMPLES / f"{name}.svg", folder / "filled")
+    (folder / "codepoints.json").write_text('{"heart": 57345, "sun": true, "other": 9}')
+    told = {"heart": {"category": "Health", "styles": {"filled": {"unicode": "f67c"}}}, "sun": {"label": "Sun <b>"}}
+    (folder / "icons.json").write_text(json.dumps(told))
+    (folder / "broken-metadata.json").write_text('{"heart": ')
+    (folder / "tags.json").write_text('{"heart": 3}')
+    render_icons([str(folder)], tmp_path / "out", ONE)
+    rows = [(row["label"], row["code_point"], row["category"]) for row in manifest(tmp_path / "out")["icons"]]
+    assert rows == [("", "U+F67C", "Health"), ("Sun <b>", "", "")]
 
 
 def test_more_copies_than_dots_allow_get_textures(tmp_path: Path) -> None:
@@ -153,7 +207,7 @@ def test_more_copies_than_dots_allow_get_textures(tmp_path: Path) -> None:
     folder = tmp_path / "copies"
     folder.mkdir()
     for number in range(14):
-        shutil.copy(SAMPLES / "pause.svg", folder / f"p{number}.svg")
+        (folder / f"p{number}.svg").write_bytes((SAMPLES / "pause.svg").read_bytes() + b" " * number)
     report = render_icons([str(folder)], tmp_path / "out", IconOptions(str(profile), workers=1, distinct=True))
     assert report.pairs[0] == 0
     assert any(0.5 in icon.pattern.amplitude for icon in report.icons)
@@ -336,6 +390,7 @@ def test_the_page_works_without_eyes_and_mouse(done: Path) -> None:
     rows = manifest(done)["icons"]
     text = "".join(page.text)
     assert page.headings == [row["name"] for row in rows]
+    assert page.text.index("Icons") < page.text.index("alarm.svg")
     for row, label in zip(rows, page.labels, strict=True):
         assert row["braille"] in text
         assert label.startswith(f"{sum(line.count('o') for line in row['pattern'])} of 36 dots raised")

@@ -1,4 +1,4 @@
-"""A planned frame as the manifest has it."""
+"""A planned frame as it stands in a manifest."""
 
 from __future__ import annotations
 
@@ -12,19 +12,13 @@ from planner import FramePlan, OperatingPoint
 
 from ..errors import WaveformError
 
-__all__ = ["mark_of"]
+__all__ = ["frame_entry"]
 
 DIGITS = 12  # significant digits of a target in the file
 
 
-def mark_of(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
-    """A frame as a manifest has it; `number` of it, from 0, for messages.
-
-    Raises
-    ------
-    WaveformError
-        When its rows are what a manifest cannot say.
-    """
+def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
+    """A frame as it stands in a manifest, `number` in it; raises WaveformError where that cannot say it."""
     assert frame.frame is not None
     assert frame.wish is not None
     per_row = device.chains_per_row
@@ -47,10 +41,9 @@ def mark_of(device: Device, frame: FramePlan, number: int) -> dict[str, Any]:
         "page": frame.frame.page,
         "span": list(frame.frame.span),
     }
-    if frame.wish.contrast_db is not None:
-        mark["contrast_db"] = frame.wish.contrast_db
-    if frame.frame.goes_on:
-        mark["goes_on"] = [asdict(one) for one in frame.frame.goes_on]
+    goes_on, page_number = [asdict(one) for one in frame.frame.goes_on], frame.frame.number
+    rare = {"contrast_db": frame.wish.contrast_db, "goes_on": goes_on, "number": page_number and asdict(page_number)}
+    mark |= {key: value for key, value in rare.items() if value}
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):
