@@ -19,17 +19,42 @@ __all__ = ["Change", "change_to"]
 
 @dataclass(frozen=True)
 class Change:
-    """What every chain holds after a change, and its way there; row by row, chain by chain."""
+    """What every chain holds after a change, and its way there; row by row, chain by chain.
+
+    Attributes
+    ----------
+    longest_s : seconds that the longest way takes; 0 where every chain stands.
+    held : whether every chain can hold what it is to hold.
+    lacking : one clause on what is lacking for the first way that cannot be gone, empty when all can.
+    rings : whether it is known that a way leaves something that rings on.
+    """
 
     targets: list[ChainTarget]
     states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
+    longest_s: float
+    held: bool
+    lacking: str
+    rings: bool
+
+    @classmethod
+    def of(
+        cls, targets: list[ChainTarget], states: tuple[OperatingPoint, ...], ramps: tuple[Ramp | None, ...]
+    ) -> Change:
+        """The change of these chains."""
+        ways = [ramp for ramp in ramps if ramp is not None]
+        return cls(
+            targets, states, ramps,
+            longest_s=max((way.duration_s for way in ways), default=0.0),
+            held=all(state.outcome is Outcome.OK for state in states),
+            lacking=next((way.lacking for way in ways if way.lacking), ""),
+            rings=any(way.residue is not None for way in ways),
+        )  # fmt: skip
 
     @property
     def made(self) -> bool:
         """Whether every chain can hold what it is to hold, and get there."""
-        held = all(state.outcome is Outcome.OK for state in self.states)
-        return held and not any(ramp is not None and ramp.lacking for ramp in self.ramps)
+        return self.held and not self.lacking
 
 
 def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> Change:
@@ -42,15 +67,15 @@ def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget
         states = _one_drive(states)
     if any(state.outcome is not Outcome.OK for state in states):
         # What cannot be held is not played: no ways are looked for.
-        return Change(after, tuple(states), (None,) * len(states))
+        return Change.of(after, tuple(states), (None,) * len(states))
     moves = _moves(memory, before, after)
     # Where lam is common, all waves begin to rise together.
     common = device.coupling.scope == "device" and any(map(_wave, after))
     wait_s = memory.leaving_s(before, moves) if common and before != after else 0.0
     ramps = memory.ramps(before, after, moves, wait_s)
     if device.coupling.scope == "device" and device.chain_length > 1:
-        return _all_alike(memory, before, Change(after, tuple(states), tuple(ramps)), moves)
-    return Change(after, tuple(states), tuple(ramps))
+        return _all_alike(memory, before, Change.of(after, tuple(states), tuple(ramps)), moves)
+    return Change.of(after, tuple(states), tuple(ramps))
 
 
 def _moves(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> bool:
@@ -109,7 +134,7 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
         states = tuple(
             replace(state, outcome=Outcome.UNREACHABLE, lacking=state.lacking or lacking) for state in change.states
         )
-        return replace(change, states=states)
+        return Change.of(change.targets, states, change.ramps)
     states = change.states
     if lams:
         lam = np.full(memory.device.chain_length - 1, lams.pop())
@@ -126,4 +151,4 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
     if model is not None and moves:
         along = Ramp(t_s=model.t_s, lam_t_s=model.lam_t_s, lam=model.lam)
         ramps = tuple(along if ramp is None else ramp for ramp in ramps)
-    return replace(change, states=states, ramps=ramps)
+    return Change.of(change.targets, states, ramps)

@@ -117,21 +117,19 @@ class _Frames:
         for frame in self._scene.frames:
             change = means.change(targets, frame)
             # What cannot be held is not played, and the next frame begins at rest.
-            played = all(state.outcome is Outcome.OK for state in change.states)
-            targets = change.targets if played else memory.at_rest
+            targets = change.targets if change.held else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
-            if not played and self._following is not None:
+            if not change.held and self._following is not None:
                 self._following.rest()
             position += samples
         change = change_to(memory, targets, memory.at_rest)
         if any(ramp is not None for ramp in change.ramps):
-            longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
-            yield self._frame(None, position, int(longest * rate) + 2, change)
+            yield self._frame(None, position, int(change.longest_s * rate) + 2, change)
 
     def _frame(self, frame: Frame | None, position: int, samples: int, change: Change) -> FramePlan:
         rate = self._device.amplifier.rate_hz
-        longest = max((ramp.duration_s for ramp in change.ramps if ramp is not None), default=0.0)
+        longest = change.longest_s
         start_s, end_s = position / rate, (position + samples) / rate
         if longest >= end_s - start_s:
             raise DwellTooShort(
@@ -141,8 +139,9 @@ class _Frames:
         times = start_s, start_s + longest, end_s
         # After the way out nothing is to be felt any more.
         residue = 0.0 if frame is None else self._left(change, start_s, longest, end_s - start_s)
-        whole = self._judged(
-            FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue)
+        outcome, note = self._verdict(change, residue)
+        whole = FramePlan(
+            frame, *times, change.states, change.ramps, outcome, note, contrast_db=self._asked_db, residue=residue
         )
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
@@ -153,7 +152,7 @@ class _Frames:
     def _left(self, change: Change, start_s: float, settled_s: float, length_s: float) -> float:
         """What changes leave that is felt in a frame, in units of full scale."""
         if self._following is None:
-            if all(ramp is None or ramp.residue is None for ramp in change.ramps):
+            if not change.rings:
                 return 0.0
             from .following import Following
 
@@ -161,22 +160,22 @@ class _Frames:
         moments = (self._device.tau_per_s * at_s for at_s in (start_s, settled_s, length_s - settled_s))
         return self._following.through(change.states, change.ramps, *moments)
 
-    def _judged(self, plan: FramePlan) -> FramePlan:
-        for state in plan.states:
-            if state.outcome is not Outcome.OK:
-                return replace(plan, outcome=state.outcome, note=self._note(state))
-        for ramp in plan.ramps:
-            if ramp is not None and ramp.lacking:
-                note = f"{self._device.name} cannot change to this pattern: {ramp.lacking}."
-                return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-        if plan.residue > AMPLITUDE_ERROR_LIMIT:
-            note = (
-                f"{self._device.name} cannot change to this pattern: what changes leave rings on at "
-                f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
-                "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
-            )
-            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-        return plan
+    def _verdict(self, change: Change, residue: float) -> tuple[Outcome, str]:
+        """What comes of a change that leaves `residue`, and a sentence where that is not ok."""
+        if change.made and residue <= AMPLITUDE_ERROR_LIMIT:
+            return Outcome.OK, ""
+        if not change.held:
+            failed = next(state for state in change.states if state.outcome is not Outcome.OK)
+            return failed.outcome, self._note(failed)
+        cannot = f"{self._device.name} cannot change to this pattern"
+        if change.lacking:
+            return Outcome.UNREACHABLE, f"{cannot}: {change.lacking}."
+        note = (
+            f"{cannot}: what changes leave rings on at "
+            f"{100 * residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
+            "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+        )
+        return Outcome.UNREACHABLE, note
 
     def _note(self, state: OperatingPoint) -> str:
         if state.outcome is not Outcome.UNREACHABLE:
