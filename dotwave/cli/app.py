@@ -23,7 +23,7 @@ from typer.models import CommandInfo
 
 from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation, Undefined
 
-from ..errors import AppError, Terminated
+from ..errors import Terminated
 from .command import (
     Actuator,
     Budget,
@@ -64,8 +64,8 @@ GAP = "in actuators."
 Words = Annotated[
     str,
     typer.Argument(
-        metavar="TEXT|FILE|-",
-        help="A file if it exists, - for stdin, else words.",
+        metavar="TEXT|FILE|FOLDER|-",
+        help="A file or folder if it exists, - for stdin, else words.",
         autocompletion=completed_texts(),
     ),
 ]
@@ -116,14 +116,22 @@ def text(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    waveforms: Annotated[bool, typer.Option("--waveforms", help="Of a folder: write a .wav for every text.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Of a folder: processes; default: all cores.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a folder: work on a dask cluster that shares it.")
+    ] = None,
     yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
 
-    TEXT|FILE|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
+    TEXT|FILE|FOLDER|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
     HTML, EPUB, DAISY, DOCX, ODT, PDF), - is standard input, anything else is the text itself. Words with a
     slash or the ending of a text and no spaces are taken for a path, and refused when there is no such file.
+
+    A folder is one job: every text and document below it is rendered, -o names a folder for library.json, a
+    journal and the waveforms, and the same call again goes on where it was.
 
     \b
     Example:
@@ -133,7 +141,7 @@ def text(
     from ..rendering.render import render
     from ..request import request_of
     from ..source import text_source
-    from .options import place_of, text_options
+    from .options import place_of, refuse, text_options
 
     request = request_of(
         tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
@@ -146,6 +154,13 @@ def text(
         page_numbers=page_numbers,
     )  # fmt: skip
     profile = device_of(device)
+    if os.path.isdir(source):
+        from ..libraries.build import WorkPlaces, render_library
+
+        places = WorkPlaces(workers, scheduler)
+        library = render_library(Path(source), output, profile, options, request, waveforms=waveforms, places=places)
+        _finish(library, as_json, ok=library.ok)
+    refuse("a folder of texts", waveforms=waveforms or None, workers=workers, scheduler=scheduler)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)
 
@@ -177,14 +192,12 @@ def verify(
       dotwave verify hello.wav --as-built --devices 200
     """
     from ..api.felt import verify as check
+    from .options import refuse
 
-    asked = {"devices": devices, "seed": seed, "scheduler": scheduler}
     if as_built:
         built = check(Path(out), devices=devices or 1000, seed=seed or 0, scheduler=scheduler)
         _finish(built, as_json, ok=built.ok)
-    for name, value in asked.items():
-        if value is not None:
-            raise AppError(f"--{name} belongs to --as-built; add that, or leave it out")
+    refuse("--as-built", devices=devices, seed=seed, scheduler=scheduler)
     report = check(Path(out))
     _finish(report, as_json, ok=report.ok)
 
