@@ -21,7 +21,7 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation
 
 from ..errors import Terminated
 from .command import (
@@ -31,12 +31,19 @@ from .command import (
     Device,
     Explain,
     Json,
+    Language,
+    Output,
     Pareto,
+    Scheduler,
     Tol,
+    Unwritable,
+    Waveforms,
+    Workers,
     Written,
     Yes,
     Yield,
     finish as _finish,
+    finish_folder,
 )
 from .completion import completed_devices, completed_texts
 from .ending import ended
@@ -82,17 +89,11 @@ Numbers = Annotated[PageNumbering | None, typer.Option(help="Nowhere, in a page'
 def text(
     source: Words,
     device: Device = "paper-6x6",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
-    ] = None,
+    output: Output = None,
     table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
-    language: Annotated[
-        str | None, typer.Option(metavar="TAG", help="Language, such as de, instead of --table.")
-    ] = None,
+    language: Language = None,
     grade: Annotated[Grade | None, typer.Option(help="With --language; uncontracted if not said.")] = None,
-    undefined: Annotated[
-        Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
-    ] = None,
+    undefined: Unwritable = None,
     cell_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty columns between cells, {GAP}")] = None,
     line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
     rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
@@ -116,11 +117,9 @@ def text(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
-    waveforms: Annotated[bool, typer.Option("--waveforms", help="Of a folder: write a .wav for every text.")] = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="Of a folder: processes; default: all cores.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a folder: work on a dask cluster that shares it.")
-    ] = None,
+    waveforms: Waveforms = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     yes: Yes = False,
     as_json: Json = False,
 ) -> None:
@@ -149,17 +148,14 @@ def text(
     )  # fmt: skip
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
-        rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
-        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages, lines=lines,
+        rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between, lines=lines,
+        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
         page_numbers=page_numbers,
     )  # fmt: skip
     profile = device_of(device)
     if os.path.isdir(source):
-        from ..libraries.build import WorkPlaces, render_library
-
-        places = WorkPlaces(workers, scheduler)
-        library = render_library(Path(source), output, profile, options, request, waveforms=waveforms, places=places)
-        _finish(library, as_json, ok=library.ok)
+        given = Path(source), output, profile, options, request
+        finish_folder(*given, as_json, waveforms=waveforms, workers=workers, scheduler=scheduler)
     refuse("a folder of texts", waveforms=waveforms or None, workers=workers, scheduler=scheduler)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)

@@ -55,7 +55,8 @@ def fetched_source() -> bytes:
     for url in (source.format(liblouis_version()) for source in SOURCES):
         try:
             with urllib.request.urlopen(url, timeout=60) as answer:
-                return answer.read()
+                data: bytes = answer.read()
+                return data
         except (urllib.error.URLError, TimeoutError) as error:
             refused.append(f"{url}: {error}")
     pytest.skip(f"not fetched: {'; '.join(refused)}; name a folder in DOTWAVE_LIBLOUIS_SPECS")

@@ -67,9 +67,8 @@ def test_nothing_is_done_twice_and_what_changed_is_done_again(folder: Path, tmp_
     (out / "one.md.wav").unlink()
     assert rendered(folder, out).worked == 2
     after = files(out)
-    assert {name for name in before if after[name] != before[name]} == {
-        "one.txt.wav", "one.txt.json", "library.json",
-    }  # fmt: skip
+    changed = {name for name in before if after[name] != before[name]}
+    assert changed - {"library.json"} == {"one.txt.wav", "one.txt.json"}
     # Other options are other files; going back is too.
     slow = TextOptions(rate=2.0)
     assert rendered(folder, out, options=slow).worked == 3
