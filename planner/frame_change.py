@@ -1,20 +1,26 @@
-"""How all chains of a device go from one pattern to the next, when some things are common to all of them."""
+"""How all chains of a device go from one pattern to the next: together where something is common to all of them."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from chainsim import Outcome
+from encoders import TargetPattern
 
 from .memory import Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
-from .targets import AmplitudeTarget, ChainTarget
+from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 
-__all__ = ["Change", "change_to"]
+__all__ = ["ChainSteps", "Change", "change_to"]
+
+# All of 64 x 64 of a chain of six, which may be held in two ways, would fit.
+MOST_STEPS = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -152,3 +158,51 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
         along = Ramp(t_s=model.t_s, lam_t_s=model.lam_t_s, lam=model.lam)
         ramps = tuple(along if ramp is None else ramp for ramp in ramps)
     return Change.of(change.targets, states, ramps)
+
+
+class _Step(NamedTuple):
+    """What one chain holds after a change, and its way there."""
+
+    target: ChainTarget
+    state: OperatingPoint
+    ramp: Ramp | None
+    duration_s: float
+    rings: bool
+
+
+class ChainSteps:
+    """In front of a memory: changes of patterns, put together from what every chain did before where it did.
+
+    A book brings the same ones again.
+
+    Only changes that could be made are remembered, and only where no lam and no drive is common to all chains: there
+    what a chain does depends on the others.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        device = memory.device
+        self._memory = memory
+        self._kinds = memory.kinds_at
+        self._apart = device.coupling.scope != "device" and device.drive != "device"
+        self._known: dict[tuple[int, ChainTarget, ChainTarget], _Step] = {}
+
+    def change(self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None = None) -> Change:
+        """The change from what chains hold to a pattern; `dots` as in `targets_of`."""
+        wanted, known = targets_of(pattern, self._memory.device, dots), self._known
+        try:
+            steps = [known[step] for step in zip(self._kinds, before, wanted, strict=True)]
+        except KeyError:
+            change = change_to(self._memory, before, self._memory.hold(pattern, before, dots))
+            if self._apart and change.made:
+                self._remember(before, wanted, change)
+            return change
+        targets, states, ramps, durations_s, rings = zip(*steps, strict=True)
+        return Change(list(targets), states, ramps, max(durations_s), True, "", any(rings))
+
+    def _remember(self, before: Sequence[ChainTarget], wanted: Sequence[ChainTarget], change: Change) -> None:
+        if len(self._known) >= MOST_STEPS:
+            self._known.clear()
+        ends = zip(self._kinds, before, wanted, strict=True)
+        for ask, target, state, ramp in zip(ends, change.targets, change.states, change.ramps, strict=True):
+            duration_s, rings = (0.0, False) if ramp is None else (ramp.duration_s, ramp.residue is not None)
+            self._known[ask] = _Step(target, state, ramp, duration_s, rings)

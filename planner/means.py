@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from encoders import Frame
 
-from .frame_change import Change
+from .frame_change import ChainSteps, Change
 from .memory import Memory
-from .steps import ChainSteps
 from .targets import AS_WISHED, ChainTarget, DotGoal
 from .wish import FrameWish
 

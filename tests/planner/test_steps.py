@@ -9,9 +9,8 @@ import pytest
 
 from chainsim import load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
-from planner import plan_scene, steps
-from planner.frame_change import Change, change_to
-from planner.steps import ChainSteps
+from planner import frame_change, plan_scene
+from planner.frame_change import ChainSteps, Change, change_to
 from planner.unequal import memory_of
 from tests.planner.test_unequal import measured
 
@@ -28,7 +27,7 @@ class CountedChanges:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.times = 0
-        monkeypatch.setattr(steps, "change_to", self)
+        monkeypatch.setattr(frame_change, "change_to", self)
 
     def __call__(self, *given: object) -> Change:
         self.times += 1
@@ -73,7 +72,7 @@ def test_chains_of_several_kinds_are_told_apart() -> None:
 
 
 def test_what_is_remembered_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(steps, "MOST_STEPS", 12)
+    monkeypatch.setattr(frame_change, "MOST_STEPS", 12)
     memory = memory_of(PAPER, 20.0)
     remembered = ChainSteps(memory)
     for seed in range(30):
