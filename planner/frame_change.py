@@ -1,35 +1,66 @@
-"""How all chains of a device go from one pattern to the next, when some things are common to all of them."""
+"""How all chains of a device go from one pattern to the next: together where something is common to all of them."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from chainsim import Outcome
+from encoders import TargetPattern
 
 from .memory import Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
-from .targets import AmplitudeTarget, ChainTarget
+from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 
-__all__ = ["Change", "change_to", "moves_between"]
+__all__ = ["ChainSteps", "Change", "change_to", "moves_between"]
+
+# All of 64 x 64 of a chain of six, which may be held in two ways, would fit.
+MOST_STEPS = 1 << 14
 
 
 @dataclass(frozen=True)
 class Change:
-    """What every chain holds after a change, and its way there; row by row, chain by chain."""
+    """What every chain holds after a change, and its way there; row by row, chain by chain.
+
+    Attributes
+    ----------
+    longest_s : seconds that the longest way takes; 0 where every chain stands.
+    held : whether every chain can hold what it is to hold.
+    lacking : one clause on what is lacking for the first way that cannot be gone, empty when all can.
+    rings : whether it is known that a way leaves something that rings on.
+    """
 
     targets: list[ChainTarget]
     states: tuple[OperatingPoint, ...]
     ramps: tuple[Ramp | None, ...]
+    longest_s: float
+    held: bool
+    lacking: str
+    rings: bool
+
+    @classmethod
+    def of(
+        cls, targets: list[ChainTarget], states: tuple[OperatingPoint, ...], ramps: tuple[Ramp | None, ...]
+    ) -> Change:
+        """The change of these chains."""
+        ways = [ramp for ramp in ramps if ramp is not None]
+        return cls(
+            targets, states, ramps,
+            longest_s=max((way.duration_s for way in ways), default=0.0),
+            held=all(state.outcome is Outcome.OK for state in states),
+            lacking=next((way.lacking for way in ways if way.lacking), ""),
+            rings=any(way.residue is not None for way in ways),
+        )  # fmt: skip
 
     @property
     def made(self) -> bool:
         """Whether every chain can hold what it is to hold, and get there."""
-        held = all(state.outcome is Outcome.OK for state in self.states)
-        return held and not any(ramp is not None and ramp.lacking for ramp in self.ramps)
+        return self.held and not self.lacking
 
 
 def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> Change:
@@ -42,15 +73,15 @@ def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget
         states = _one_drive(states)
     if any(state.outcome is not Outcome.OK for state in states):
         # What cannot be held is not played: no ways are looked for.
-        return Change(after, tuple(states), (None,) * len(states))
+        return Change.of(after, tuple(states), (None,) * len(states))
     moves = moves_between(memory, before, after)
     # Where lam is common, all waves begin to rise together.
     common = device.coupling.scope == "device" and any(map(_wave, after))
     wait_s = memory.leaving_s(before, moves) if common and before != after else 0.0
     ramps = memory.ramps(before, after, moves, wait_s)
     if device.coupling.scope == "device" and device.chain_length > 1:
-        return _all_alike(memory, before, Change(after, tuple(states), tuple(ramps)), moves)
-    return Change(after, tuple(states), tuple(ramps))
+        return _all_alike(memory, before, Change.of(after, tuple(states), tuple(ramps)), moves)
+    return Change.of(after, tuple(states), tuple(ramps))
 
 
 def moves_between(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> bool:
@@ -109,7 +140,7 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
         states = tuple(
             replace(state, outcome=Outcome.UNREACHABLE, lacking=state.lacking or lacking) for state in change.states
         )
-        return replace(change, states=states)
+        return Change.of(change.targets, states, change.ramps)
     states = change.states
     if lams:
         lam = np.full(memory.device.chain_length - 1, lams.pop())
@@ -126,4 +157,52 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
     if model is not None and moves:
         along = Ramp(t_s=model.t_s, lam_t_s=model.lam_t_s, lam=model.lam)
         ramps = tuple(along if ramp is None else ramp for ramp in ramps)
-    return replace(change, states=states, ramps=ramps)
+    return Change.of(change.targets, states, ramps)
+
+
+class _Step(NamedTuple):
+    """What one chain holds after a change, and its way there."""
+
+    target: ChainTarget
+    state: OperatingPoint
+    ramp: Ramp | None
+    duration_s: float
+    rings: bool
+
+
+class ChainSteps:
+    """In front of a memory: changes of patterns, put together from what every chain did before where it did.
+
+    A book brings the same ones again.
+
+    Only changes that could be made are remembered, and only where no lam and no drive is common to all chains: there
+    what a chain does depends on the others.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        device = memory.device
+        self._memory = memory
+        self._kinds = memory.kinds_at
+        self._apart = device.coupling.scope != "device" and device.drive != "device"
+        self._known: dict[tuple[int, ChainTarget, ChainTarget], _Step] = {}
+
+    def change(self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None = None) -> Change:
+        """The change from what chains hold to a pattern; `dots` as in `targets_of`."""
+        wanted, known = targets_of(pattern, self._memory.device, dots), self._known
+        try:
+            steps = [known[step] for step in zip(self._kinds, before, wanted, strict=True)]
+        except KeyError:
+            change = change_to(self._memory, before, self._memory.hold(pattern, before, dots))
+            if self._apart and change.made:
+                self._remember(before, wanted, change)
+            return change
+        targets, states, ramps, durations_s, rings = zip(*steps, strict=True)
+        return Change(list(targets), states, ramps, max(durations_s), True, "", any(rings))
+
+    def _remember(self, before: Sequence[ChainTarget], wanted: Sequence[ChainTarget], change: Change) -> None:
+        if len(self._known) >= MOST_STEPS:
+            self._known.clear()
+        ends = zip(self._kinds, before, wanted, strict=True)
+        for ask, target, state, ramp in zip(ends, change.targets, change.states, change.ramps, strict=True):
+            duration_s, rings = (0.0, False) if ramp is None else (ramp.duration_s, ramp.residue is not None)
+            self._known[ask] = _Step(target, state, ramp, duration_s, rings)

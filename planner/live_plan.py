@@ -14,7 +14,7 @@ from encoders import Frame, TargetPattern
 from .frame_change import Change, change_to, moves_between
 from .means import plain_means
 from .plan import FramePlan
-from .scene_plan import DEFAULT_CONTRAST_DB, judged
+from .scene_plan import DEFAULT_CONTRAST_DB, verdict
 from .targets import ChainTarget
 
 __all__ = ["LivePlan", "LiveWay"]
@@ -135,7 +135,9 @@ class LivePlan:
         self._held = way.after
 
     def _way(self, frame: Frame | None, before: list[ChainTarget], change: Change) -> LiveWay:
-        longest = max((ramp.duration_s for ramp in change.ramps if ramp is not None), default=0.0)
-        plan = FramePlan(frame, 0.0, longest, longest, change.states, change.ramps, contrast_db=self._asked_db)
+        longest, (outcome, note) = change.longest_s, verdict(change, 0.0, self._means.memory)
+        plan = FramePlan(
+            frame, 0.0, longest, longest, change.states, change.ramps, outcome, note, contrast_db=self._asked_db
+        )
         # A list of its own, so that what is held can be told from what was held before.
-        return LiveWay(judged(plan, self._means.memory), before, list(change.targets))
+        return LiveWay(plan, before, list(change.targets))

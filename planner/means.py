@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from chainsim import Device
 from encoders import Frame
 
-from .frame_change import Change, change_to
+from .frame_change import ChainSteps, Change
 from .memory import Memory
 from .targets import AS_WISHED, ChainTarget, DotGoal
 from .wish import FrameWish
@@ -37,17 +38,21 @@ class Means:
     tried: tuple[MeansTried, ...] = ()
     share: float | None = None
 
+    @cached_property
+    def _steps(self) -> ChainSteps:
+        return ChainSteps(self.memory)
+
     def change(self, before: list[ChainTarget], frame: Frame) -> Change:
         """The change from what chains hold to a frame.
 
         Where no way leads to dots as they are aimed at, they are aimed at as they are wished.
         """
-        dots = self.dots if FrameWish.of(frame).dots else None
-        change = change_to(self.memory, before, self.memory.hold(frame.pattern, before, dots))
+        dots = self.dots if self.dots is not None and FrameWish.of(frame).dots else None
+        change = self._steps.change(before, frame.pattern, dots)
         if dots is None or change.made:
             return change
         wished = replace(dots, loudest=AS_WISHED)
-        return change_to(self.memory, before, self.memory.hold(frame.pattern, before, wished))
+        return self._steps.change(before, frame.pattern, wished)
 
 
 def plain_means(device: Device, contrast_db: float) -> Means:

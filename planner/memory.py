@@ -45,7 +45,12 @@ class Memory:
     @cached_property
     def rest(self) -> ChainTarget:
         """What a chain holds that has nothing to do."""
-        return AmplitudeTarget((0.0,) * self.device.chain_length)
+        return AmplitudeTarget.of(np.zeros(self.device.chain_length))
+
+    @property
+    def kinds_at(self) -> Sequence[int]:
+        """Which kind each chain of the device is; chains of one kind do the same for the same pattern."""
+        return [0] * (self.device.rows * self.device.chains_per_row)
 
     @property
     def at_rest(self) -> list[ChainTarget]:

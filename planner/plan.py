@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class Ramp:
     tones: tuple[ToneRamp, ...] = ()
     residue: Floats | None = None
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         """Length of the ramp in seconds."""
         return float(self.t_s[-1])
@@ -128,7 +129,7 @@ class FramePlan:
     @property
     def error(self) -> float:
         """Predicted worst deviation of any actuator from what is aimed at, in units of full scale."""
-        return max(state.error for state in self.states) + self.residue
+        return max([state.error for state in self.states]) + self.residue
 
 
 @dataclass(frozen=True)

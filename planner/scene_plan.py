@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .following import Following
     from .robustness.expected import Expectation
 
-__all__ = ["DEFAULT_CONTRAST_DB", "judged", "kept_share", "plan_scene"]
+__all__ = ["DEFAULT_CONTRAST_DB", "kept_share", "plan_scene", "verdict"]
 
 DEFAULT_CONTRAST_DB = 20.0
 
@@ -113,21 +113,19 @@ class _Frames:
         for frame in self._scene.frames:
             change = means.change(targets, frame)
             # What cannot be held is not played, and the next frame begins at rest.
-            played = all(state.outcome is Outcome.OK for state in change.states)
-            targets = change.targets if played else memory.at_rest
+            targets = change.targets if change.held else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
-            if not played and self._following is not None:
+            if not change.held and self._following is not None:
                 self._following.rest()
             position += samples
         change = change_to(memory, targets, memory.at_rest)
         if any(ramp is not None for ramp in change.ramps):
-            longest = max(ramp.duration_s for ramp in change.ramps if ramp is not None)
-            yield self._frame(None, position, int(longest * rate) + 2, change)
+            yield self._frame(None, position, int(change.longest_s * rate) + 2, change)
 
     def _frame(self, frame: Frame | None, position: int, samples: int, change: Change) -> FramePlan:
         rate = self._device.amplifier.rate_hz
-        longest = max((ramp.duration_s for ramp in change.ramps if ramp is not None), default=0.0)
+        longest = change.longest_s
         start_s, end_s = position / rate, (position + samples) / rate
         if longest >= end_s - start_s:
             raise DwellTooShort(
@@ -137,9 +135,9 @@ class _Frames:
         times = start_s, start_s + longest, end_s
         # After the way out nothing is to be felt any more.
         residue = 0.0 if frame is None else self._left(change, start_s, longest, end_s - start_s)
-        whole = judged(
-            FramePlan(frame, *times, change.states, change.ramps, contrast_db=self._asked_db, residue=residue),
-            self.means.memory,
+        outcome, note = verdict(change, residue, self.means.memory)
+        whole = FramePlan(
+            frame, *times, change.states, change.ramps, outcome, note, contrast_db=self._asked_db, residue=residue
         )
         if self._expected is None or frame is None or whole.outcome is not Outcome.OK:
             return whole
@@ -150,7 +148,7 @@ class _Frames:
     def _left(self, change: Change, start_s: float, settled_s: float, length_s: float) -> float:
         """What changes leave that is felt in a frame, in units of full scale."""
         if self._following is None:
-            if all(ramp is None or ramp.residue is None for ramp in change.ramps):
+            if not change.rings:
                 return 0.0
             from .following import Following
 
@@ -159,24 +157,22 @@ class _Frames:
         return self._following.through(change.states, change.ramps, *moments)
 
 
-def judged(plan: FramePlan, memory: Memory) -> FramePlan:
-    """A frame with its outcome, and a sentence where that is not ok."""
-    name = memory.device.name
-    for state in plan.states:
-        if state.outcome is not Outcome.OK:
-            return replace(plan, outcome=state.outcome, note=_note(state, memory))
-    for ramp in plan.ramps:
-        if ramp is not None and ramp.lacking:
-            note = f"{name} cannot change to this pattern: {ramp.lacking}."
-            return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-    if plan.residue > AMPLITUDE_ERROR_LIMIT:
-        note = (
-            f"{name} cannot change to this pattern: what changes leave rings on at "
-            f"{100 * plan.residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
-            "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
-        )
-        return replace(plan, outcome=Outcome.UNREACHABLE, note=note)
-    return plan
+def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, str]:
+    """What comes of a change that leaves `residue`, of full scale, and a sentence where that is not ok."""
+    if change.made and residue <= AMPLITUDE_ERROR_LIMIT:
+        return Outcome.OK, ""
+    if not change.held:
+        failed = next(state for state in change.states if state.outcome is not Outcome.OK)
+        return failed.outcome, _note(failed, memory)
+    cannot = f"{memory.device.name} cannot change to this pattern"
+    if change.lacking:
+        return Outcome.UNREACHABLE, f"{cannot}: {change.lacking}."
+    note = (
+        f"{cannot}: what changes leave rings on at "
+        f"{100 * residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
+        "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+    )
+    return Outcome.UNREACHABLE, note
 
 
 def _note(state: OperatingPoint, memory: Memory) -> str:

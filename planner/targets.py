@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Device
-from encoders import TargetPattern
+from encoders import TargetPattern, WalkingBars
 
 from .wish import threshold_for
 
@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 # Phases are told apart to so many decimals, so that rows of a plane wave are the same but for a turn.
 PHASE_DECIMALS = 9
 AMPLITUDE_DECIMALS = 12
+# Rows of amplitudes that are kept, the latest.
+MOST_AMPLITUDES = 4096
 
 
 AS_WISHED = 1.0
@@ -114,7 +116,7 @@ class AmplitudeTarget(ChainTarget):
     @classmethod
     def of(cls, levels: Floats, turn: float = 0.0, dots: DotGoal | None = None) -> AmplitudeTarget:
         """Of amplitudes in an array of shape (n,); rest is rest, whatever it is for."""
-        return cls(tuple(levels.tolist()), turn=turn, dots=dots if np.any(levels) else None)
+        return _amplitude(levels.tobytes(), turn, dots)
 
     @property
     def key(self) -> bytes:
@@ -207,26 +209,51 @@ def _array(numbers: tuple[float, ...]) -> Floats:
     return array
 
 
-def targets_of(pattern: TargetPattern, device: Device, dots: DotGoal | None = None) -> Iterator[ChainTarget]:
+def targets_of(pattern: TargetPattern, device: Device, dots: DotGoal | None = None) -> Sequence[ChainTarget]:
     """What a pattern wants of every chain of `device`, row by row; `dots` where its amplitudes are dots."""
-    n = device.chain_length
-    size, angle = np.abs(pattern.amplitude), np.angle(pattern.amplitude)
-    weight = np.ones(size.shape) if pattern.weight is None else np.asarray(pattern.weight, dtype=np.float64)
-    matters = np.full(size.shape, pattern.phase_matters) & (size > 0) & (weight > 0)
+    n, size = device.chain_length, np.abs(pattern.amplitude)
+    weight = None if pattern.weight is None else np.asarray(pattern.weight, dtype=np.float64)
+    matters = _phases_that_matter(pattern, size, weight)
+    if pattern.walking is None and matters is None:
+        return _amplitudes(size if weight is None or np.all(weight > 0) else size * (weight > 0), n, dots)
+    phase = np.full(size.shape, np.nan) if matters is None else np.where(matters, np.angle(pattern.amplitude), np.nan)
+    sizes, phases = size.reshape(-1, n), phase.reshape(-1, n)
+    weights = (np.ones(size.shape) if weight is None else weight).reshape(-1, n)
+    return [
+        _standing(levels, phase, heed)
+        if pattern.walking is None or not np.any(levels)
+        else _walking(pattern.walking, levels, heed, number % device.chains_per_row * n)
+        for number, (levels, phase, heed) in enumerate(zip(sizes, phases, weights, strict=True))
+    ]
+
+
+def _walking(bars: WalkingBars, levels: Floats, weights: Floats, place: int) -> WalkingTarget:
+    width, rate_hz = (None if np.isnan(one) else float(one) for one in (bars.width, bars.rate_hz))
+    return WalkingTarget(tuple(levels.tolist()), tuple(weights.tolist()), width, rate_hz, place)
+
+
+def _phases_that_matter(pattern: TargetPattern, size: Floats, weight: Floats | None) -> NDArray[np.bool_] | None:
+    """Where phases are part of the wish; None where they are nowhere."""
+    if not pattern.phase_matters:
+        return None
+    matters = size > 0
+    if weight is not None:
+        matters &= weight > 0
     if pattern.any_phase is not None:
         matters &= ~pattern.any_phase
-    sizes, phases, weights = (part.reshape(-1, n) for part in (size, np.where(matters, angle, np.nan), weight))
-    if pattern.walking is None and not matters.any():
-        heeded = sizes if np.all(weights > 0) else sizes * (weights > 0)
-        yield from (AmplitudeTarget.of(levels, dots=dots) for levels in heeded)
-        return
-    for number, (levels, phase, heed) in enumerate(zip(sizes, phases, weights, strict=True)):
-        if pattern.walking is not None and np.any(levels):
-            place, walking = number % device.chains_per_row * n, pattern.walking
-            width, rate_hz = (None if np.isnan(one) else float(one) for one in (walking.width, walking.rate_hz))
-            yield WalkingTarget(tuple(levels.tolist()), tuple(heed.tolist()), width, rate_hz, place)
-        else:
-            yield _standing(levels, phase, heed)
+    return matters if matters.any() else None
+
+
+def _amplitudes(size: Floats, n: int, dots: DotGoal | None) -> list[AmplitudeTarget]:
+    raw, step = size.tobytes(), n * size.itemsize
+    return [_amplitude(raw[at : at + step], 0.0, dots) for at in range(0, len(raw), step)]
+
+
+@lru_cache(maxsize=MOST_AMPLITUDES)
+def _amplitude(levels: bytes, turn: float, dots: DotGoal | None) -> AmplitudeTarget:
+    """One object for equal rows: a dictionary finds what is the same object without comparing it."""
+    array = np.frombuffer(levels)
+    return AmplitudeTarget(tuple(array.tolist()), turn=turn, dots=dots if np.any(array) else None)
 
 
 def _standing(levels: Floats, phases: Floats, weights: Floats) -> ChainTarget:

@@ -53,6 +53,11 @@ class UnequalMemory(Memory):
         self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
         self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
 
+    @property
+    def kinds_at(self) -> Sequence[int]:
+        """Which kind each chain of the device is."""
+        return self._kind_at
+
     def hold(
         self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None
     ) -> list[ChainTarget]:

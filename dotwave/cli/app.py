@@ -21,9 +21,9 @@ import typer
 from typer.main import get_command_name
 from typer.models import CommandInfo
 
-from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation, Undefined
+from encoders import EmphasisChoice, Grade, ImageChoice, LineEnds, Mathematics, PageNumbering, Presentation
 
-from ..errors import AppError, Terminated
+from ..errors import Terminated
 from .command import (
     Actuator,
     Budget,
@@ -31,12 +31,19 @@ from .command import (
     Device,
     Explain,
     Json,
+    Language,
+    Output,
     Pareto,
+    Scheduler,
     Tol,
+    Unwritable,
+    Waveforms,
+    Workers,
     Written,
     Yes,
     Yield,
     finish as _finish,
+    finish_folder,
 )
 from .completion import completed_devices, completed_texts
 from .ending import ended
@@ -64,8 +71,8 @@ GAP = "in actuators."
 Words = Annotated[
     str,
     typer.Argument(
-        metavar="TEXT|FILE|-",
-        help="A file if it exists, - for stdin, else words.",
+        metavar="TEXT|FILE|FOLDER|-",
+        help="A file or folder if it exists, - for stdin, else words.",
         autocompletion=completed_texts(),
     ),
 ]
@@ -82,17 +89,11 @@ Numbers = Annotated[PageNumbering | None, typer.Option(help="Nowhere, in a page'
 def text(
     source: Words,
     device: Device = "paper-6x6",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write, .wav for one; none: plan only.")
-    ] = None,
+    output: Output = None,
     table: Annotated[str | None, typer.Option(help="Table file, list, or query: 'language:de grade:2'.")] = None,
-    language: Annotated[
-        str | None, typer.Option(metavar="TAG", help="Language, such as de, instead of --table.")
-    ] = None,
+    language: Language = None,
     grade: Annotated[Grade | None, typer.Option(help="With --language; uncontracted if not said.")] = None,
-    undefined: Annotated[
-        Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
-    ] = None,
+    undefined: Unwritable = None,
     cell_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty columns between cells, {GAP}")] = None,
     line_gap: Annotated[int | None, typer.Option(min=0, help=f"Empty rows between lines, {GAP}")] = None,
     rate: Annotated[float | None, typer.Option(help="Reading rate, cells per second.")] = None,
@@ -116,14 +117,20 @@ def text(
     budget: Budget = None,
     explain: Explain = False,
     pareto: Pareto = None,
+    waveforms: Waveforms = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Render text as Braille and write the waveforms that make it felt.
 
-    TEXT|FILE|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
+    TEXT|FILE|FOLDER|-: a path that exists is read as a file (text, Unicode Braille, BRF, PEF, eBraille, Markdown,
     HTML, EPUB, DAISY, DOCX, ODT, PDF), - is standard input, anything else is the text itself. Words with a
     slash or the ending of a text and no spaces are taken for a path, and refused when there is no such file.
+
+    A folder is one job: every text and document below it is rendered, -o names a folder for library.json, a
+    journal and the waveforms, and the same call again goes on where it was.
 
     \b
     Example:
@@ -133,7 +140,7 @@ def text(
     from ..rendering.render import render
     from ..request import request_of
     from ..source import text_source
-    from .options import place_of, text_options
+    from .options import place_of, refuse, text_options
 
     request = request_of(
         tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
@@ -141,11 +148,15 @@ def text(
     )  # fmt: skip
     options = text_options(
         table=table, language=language, grade=grade, undefined=undefined, cell_gap=cell_gap, line_gap=line_gap,
-        rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between,
-        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages, lines=lines,
+        rate=rate, dwell_s=dwell, presentation=presentation, dots=dots, blank_between=blank_between, lines=lines,
+        encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
         page_numbers=page_numbers,
     )  # fmt: skip
     profile = device_of(device)
+    if os.path.isdir(source):
+        given = Path(source), output, profile, options, request
+        finish_folder(*given, as_json, waveforms=waveforms, workers=workers, scheduler=scheduler)
+    refuse("a folder of texts", waveforms=waveforms or None, workers=workers, scheduler=scheduler)
     report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
     _finish(report, as_json, ok=report.ok)
 
@@ -177,14 +188,12 @@ def verify(
       dotwave verify hello.wav --as-built --devices 200
     """
     from ..api.felt import verify as check
+    from .options import refuse
 
-    asked = {"devices": devices, "seed": seed, "scheduler": scheduler}
     if as_built:
         built = check(Path(out), devices=devices or 1000, seed=seed or 0, scheduler=scheduler)
         _finish(built, as_json, ok=built.ok)
-    for name, value in asked.items():
-        if value is not None:
-            raise AppError(f"--{name} belongs to --as-built; add that, or leave it out")
+    refuse("--as-built", devices=devices, seed=seed, scheduler=scheduler)
     report = check(Path(out))
     _finish(report, as_json, ok=report.ok)
 

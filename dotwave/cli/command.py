@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from drivers import SUFFIXES
+from encoders import Undefined
 
 from ..errors import AppError
 from ..plain import Printable, printable
 from .completion import completed_devices, completed_files
 
+if TYPE_CHECKING:
+    from chainsim import Device as Profile
+    from encoders import TextOptions
+
+    from ..request import Request
+
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Pareto", "Tol", "Written", "Yes", "Yield", "finish",
-    "printable", "say",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Output", "Pareto", "Scheduler", "Tol",
+    "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder", "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -58,6 +66,19 @@ Yield = Annotated[
 Actuator = Annotated[
     str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
 ]
+Language = Annotated[str | None, typer.Option(metavar="TAG", help="Language, such as de, instead of --table.")]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="File to write, .wav for one; of a folder a folder; none: plan only."),
+]
+Unwritable = Annotated[
+    Undefined | None, typer.Option(help="Characters the table cannot write: name them, leave them out, refuse.")
+]
+Waveforms = Annotated[bool, typer.Option("--waveforms", help="Of a folder: write a .wav for every text.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Of a folder: processes; default: all cores.")]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Of a folder: work on a dask cluster that shares it.")
+]
 Explain = Annotated[bool, typer.Option("--explain", help="Also list which terms of the model are needed, and why.")]
 Pareto = Annotated[
     str | None,
@@ -71,6 +92,27 @@ def finish(report: Printable, as_json: bool, *, ok: bool) -> NoReturn:
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
     say(shown)
     raise typer.Exit(0 if ok else 1)
+
+
+def finish_folder(
+    folder: Path,
+    out: Path | None,
+    device: Profile,
+    options: TextOptions,
+    request: Request,
+    as_json: bool,
+    *,
+    waveforms: bool,
+    workers: int | None,
+    scheduler: str | None,
+) -> NoReturn:
+    """Render all texts of a folder and print the report; arguments are those of `libraries.build.render_library`."""
+    # Imported here: one text does without.
+    from ..libraries.build import WorkPlaces, render_library
+
+    places = WorkPlaces(workers, scheduler)
+    report = render_library(folder, out, device, options, request, waveforms=waveforms, places=places)
+    finish(report, as_json, ok=report.ok)
 
 
 def say(words: str) -> None:

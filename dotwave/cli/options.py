@@ -13,7 +13,7 @@ from ..errors import AppError
 if TYPE_CHECKING:
     from encoders import PictureOptions, TextOptions
 
-__all__ = ["Dots", "SampleFormat", "picture_options", "place_of", "text_options"]
+__all__ = ["Dots", "SampleFormat", "picture_options", "place_of", "refuse", "text_options"]
 
 
 class Dots(StrEnum):
@@ -71,6 +71,19 @@ def picture_options(**given: Any) -> PictureOptions:
             option = "as" if name == "output" else name
             raise AppError(f"--{option}: expected one of {', '.join(words)}, got {value!r}")
     return PictureOptions(**chosen)
+
+
+def refuse(what: str, **given: Any) -> None:
+    """Refuse the options in `given` that say something (are not None).
+
+    Raises
+    ------
+    AppError
+        For the first of them; `what` is what they belong to.
+    """
+    for name, value in given.items():
+        if value is not None:
+            raise AppError(f"--{name} belongs to {what}; give that too, or leave it out")
 
 
 def place_of(words: str | None) -> tuple[int, int] | None:

@@ -43,7 +43,7 @@ class Journal:
                 for raw in iter(lambda: lines.readline(LONGEST), b""):
                     if not end and not _starts(raw):
                         os.close(self._file)
-                        raise FileError(f"{path}: not a journal of dotwave icons; give another folder, or move it away")
+                        raise FileError(f"{path}: not a journal of dotwave; give another folder, or move it away")
                     self._note(raw, end)
                     end += len(raw)
         if not raw.endswith(b"\n"):

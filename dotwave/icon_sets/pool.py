@@ -100,6 +100,7 @@ class LocalPool(Pool):
     Parameters
     ----------
     seconds : processor time that a task may take; one that takes more is not tried again.
+    cure : for a task that takes more.
 
     Raises
     ------
@@ -107,8 +108,9 @@ class LocalPool(Pool):
         When a process cannot be started, or ends before it could begin.
     """
 
-    def __init__(self, workers: int | None = None, seconds: float = TASK_S) -> None:
+    def __init__(self, workers: int | None = None, seconds: float = TASK_S, cure: str = SIMPLER) -> None:
         self.size = workers or os.cpu_count() or 1
+        self._cure = cure
         self._seconds = seconds
         self._workers: list[_Busy] = []
         self._again: deque[tuple[Task, ...]] = deque()
@@ -162,7 +164,7 @@ class LocalPool(Pool):
         if isinstance(answer, Gone):
             self._replace(busy)
         if isinstance(answer, Gone) and answer.limited:
-            yield Ended(batch[at : at + 1], [_lost(batch[at], f"{answer.problem}; {SIMPLER}")])
+            yield Ended(batch[at : at + 1], [_lost(batch[at], f"{answer.problem}; {self._cure}")])
         else:
             yield Ended(batch[at : at + 1], None, answer.problem)
 

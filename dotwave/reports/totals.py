@@ -9,9 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from chainsim import Device, Outcome
-from planner import FramePlan
+from planner import FramePlan, OperatingPoint
 
 __all__ = ["Spreading", "Totals", "nearest_lines"]
+
+MARGINS = ("volts", "well", "noise_gain", "slew", "multiplier")
+# States that are remembered as looked at.
+MOST_STATES = 4096
 
 
 class Spreading(Protocol):
@@ -48,6 +52,7 @@ class Totals:
     multiplier: float = 0.0
     spread: Spreading | None = None
     _page: int = -1
+    _states: dict[int, OperatingPoint] = field(default_factory=dict)
 
     def add(self, frame: FramePlan) -> None:
         """Take a frame into account."""
@@ -56,15 +61,17 @@ class Totals:
         if frame.frame is not None and frame.frame.page != self._page:
             self._page = frame.frame.page
             self.pages += 1
-        margins = [state.margins for state in frame.states]
         self.duration_s = frame.end_s
         self.ramp_s = max(self.ramp_s, frame.settled_s - frame.start_s)
         self.error = max(self.error, frame.error)
-        self.volts = max(self.volts, *(margin.volts for margin in margins))
-        self.well = max(self.well, *(margin.well for margin in margins))
-        self.noise_gain = max(self.noise_gain, *(margin.noise_gain for margin in margins))
-        self.slew = max(self.slew, *(margin.slew for margin in margins))
-        self.multiplier = max(self.multiplier, *(margin.multiplier for margin in margins))
+        for state in frame.states:
+            # Equal rows come from the planner as the same object.
+            if id(state) not in self._states:
+                if len(self._states) >= MOST_STATES:
+                    self._states.clear()
+                self._states[id(state)] = state
+                for name in MARGINS:
+                    setattr(self, name, max(getattr(self, name), getattr(state.margins, name)))
         if frame.spread is not None and (self.spread is None or frame.spread.expected > self.spread.expected):
             self.spread = frame.spread
 

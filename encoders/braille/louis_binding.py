@@ -42,6 +42,8 @@ _PATTERNS = (
 )
 _DOTS_AS_UNICODE = 4 | 64  # dotsIO | ucBrl
 _NO_UNDEFINED = 128
+# Characters of a text for which buffers are kept; paragraphs come in pieces of fewer.
+_USUAL = 2048
 _LOG_WARN, _LOG_ERROR = 30000, 40000
 # With this display table in front every table reads and writes U+28xx, also those that bring another one.
 _UNICODE_DISPLAY = "unicode.dis"
@@ -145,10 +147,39 @@ def translate(
     tables. The last list is shorter than `text` when the library stopped early. A position may be -1.
     """
     with _lock:
-        cells, text_of_cell, cell_of_text, _ = _louis().translate(
+        louis = _louis()
+        if emphases is None and len(text) <= _USUAL:
+            return _plainly(louis, tables, text)
+        cells, text_of_cell, cell_of_text, _ = louis.translate(
             list(tables), text, typeform=emphases, mode=_DOTS_AS_UNICODE
         )
     return cells, text_of_cell, cell_of_text
+
+
+def _plainly(louis: ModuleType, tables: tuple[str, ...], text: str) -> tuple[str, list[int], list[int]]:
+    """As the binding's `translate` does it without emphases, in buffers that are made once: a third quicker."""
+    raw = text.encode(louis.conversionEncoding, "surrogatepass")
+    read = ctypes.c_int(len(raw) // louis.wideCharBytes)
+    written = ctypes.c_int(read.value * louis.outlenMultiplier)
+    cells, text_of_cell, cell_of_text = _buffers(_USUAL * louis.outlenMultiplier, louis.wideCharBytes)
+    done = louis.liblouis.lou_translate(
+        ",".join(tables).encode(louis.fileSystemEncoding), raw, ctypes.byref(read), cells, ctypes.byref(written),
+        None, None, cell_of_text, text_of_cell, None, _DOTS_AS_UNICODE,
+    )  # fmt: skip
+    if not done:
+        raise RuntimeError(f"liblouis cannot translate {text!r}")
+    found = ctypes.string_at(cells, written.value * louis.wideCharBytes)
+    return (
+        found.decode(louis.conversionEncoding, "surrogatepass"),
+        text_of_cell[: written.value],
+        cell_of_text[: read.value],
+    )
+
+
+@cache
+def _buffers(size: int, char_bytes: int) -> tuple[Any, Any, Any]:
+    """Room for so many cells, and for two lists of places."""
+    return ctypes.create_string_buffer(size * char_bytes), (ctypes.c_int * size)(), (ctypes.c_int * size)()
 
 
 def translate_string(tables: tuple[str, ...], text: str, *, undefined: bool) -> str:

@@ -34,14 +34,15 @@ def presenter(layout: Layout, presentation: Presentation) -> Callable[[str], Sho
     places = _places(layout)
     dots_of = blocks(layout.height)
     shape = (layout.shape.rows, layout.shape.cols)
-    width = layout.cells_per_line
+    width, spots = layout.cells_per_line, places.reshape(-1)
 
     def show(page: str) -> ShownPage:
-        codes = np.frombuffer(page.encode("utf-16-le"), dtype="<u2") & 0xFF
+        # The low byte of U+28xx says which dots there are.
+        codes = np.frombuffer(page.encode("utf-16-le"), dtype=np.uint8)[::2]
         grid = np.zeros(shape, dtype=np.complex128)
-        grid.reshape(-1)[places] = dots_of[codes]
-        lines = "\n".join(page[at : at + width] for at in range(0, len(page), width))
-        return ShownPage(lines, tuple(_pattern(part) for part in _parts(grid, places, presentation)))
+        grid.put(spots, dots_of[codes])
+        lines = "\n".join([page[at : at + width] for at in range(0, len(page), width)])
+        return ShownPage(lines, tuple([_pattern(part) for part in _parts(grid, places, presentation)]))
 
     size = 16 * shape[0] * shape[1] * (1 if presentation is Presentation.TOGETHER else layout.height * layout.lines)
     return lru_cache(maxsize=max(16, min(4096, _CACHE_BYTES // size)))(show)

@@ -245,8 +245,8 @@ class TextFrames:
             # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
             gap = PARAGRAPH_END.match(text, page.end) if page.end_of_block else None
             span = (page.start, gap.end() if gap else page.end)
-            first, last = (bisect_left(self._headings, place, key=itemgetter(0)) for place in span)
-            headings = tuple(heading for _, heading in self._headings[first:last])
+            places = [bisect_left(self._headings, at, key=itemgetter(0)) for at in span] if self._headings else (0, 0)
+            headings = tuple([heading for _, heading in self._headings[slice(*places)]])
             for frame in self._shown(page, log.pages):
                 yield replace(frame, text=text[slice(*span)], span=span, goes_on=page.goes_on, headings=headings)
                 headings = ()

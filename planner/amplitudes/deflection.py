@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Outcome, Setting
 
-from ..closed_forms.links import stages
+from ..closed_forms.links import Stage, stages
 from ..family import AmplitudeFamily
 from ..margins import WELL_SHARE
 from ..operating_point import Margins, OperatingPoint
@@ -40,13 +41,17 @@ class Deflection(AmplitudeFamily):
 
     def _bias(self, z: Floats, force: Floats) -> Floats:
         """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
-        before, own = np.roll(z, 1, axis=-1), stages(self.device.chain)
+        before, own = np.roll(z, 1, axis=-1), self._own
         links = self._links.copy()
         if self.device.coupling.closure is Closure.OPEN:
             links[0] = 0.0
         return np.asarray(force + own.stiffness * z + own.beta * z**3 - links * (before - z))
 
-    @property
+    @cached_property
+    def _own(self) -> Stage:
+        return stages(self.device.chain)
+
+    @cached_property
     def _links(self) -> Floats:
         """What the links into each actuator make of the smallest lam; the first of a ring closes it."""
         device = self.device
@@ -89,7 +94,7 @@ class Deflection(AmplitudeFamily):
         ]
 
     def _margins(self, bias: Floats) -> Margins:
-        own = stages(self.device.chain)
+        own = self._own
         soft = np.minimum(own.beta, 0.0)
         with np.errstate(divide="ignore"):
             fold = 2 * np.power(own.stiffness, 1.5) / (3 * np.sqrt(3 * -soft))
@@ -105,7 +110,7 @@ class Deflection(AmplitudeFamily):
             share = f"{100 * margins.volts:.0f} % of the amplifier's volts"
             return f"it takes {share}; it lacks volts, or a lower full_scale"
         # Past the fold the bias that balances a deflection falls again, but nothing stable stands there.
-        own = stages(device.chain)
+        own = self._own
         stiffness = own.stiffness + device.coupling.lam.min + 3 * own.beta * (target * device.full_scale) ** 2
         if np.any(stiffness <= 0):
             return "it lies beyond the fold of the softening well; it lacks depth of the well, or a lower full_scale"
@@ -124,20 +129,19 @@ class Deflection(AmplitudeFamily):
         self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
     ) -> list[Ramp | None]:
         """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
-        duration = self.ramp_s * self.device.tau_per_s
+        duration, own = self.ramp_s * self.device.tau_per_s, self._own
         blend = jets.smoothstep(SMOOTHNESS, NODES, 4)
         x = np.linspace(0.0, self.ramp_s, NODES)
-        out: list[Ramp | None] = []
-        for one, other in zip(before, after, strict=True):
-            step = (other.target - one.target) * self.device.full_scale
-            if not np.any(step):
-                out.append(None)
-                continue
-            z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))
-            z = z + one.target * self.device.full_scale
-            own = stages(self.device.chain)
-            bias = self._bias(z, push + own.delta * speed)
-            linear = self._bias(speed, jerk + own.delta * push)
-            slope = linear + own.beta * (3 * z**2 * speed - speed**3)
-            out.append(Ramp(t_s=x, bias=bias, bias_slope=slope * self.device.tau_per_s))
-        return out
+        begin, end = (np.array([point.target for point in points])[:, None] for points in (before, after))
+        step = (end - begin) * self.device.full_scale
+        z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))
+        z = z + begin * self.device.full_scale
+        bias = self._bias(z, push + own.delta * speed)
+        linear = self._bias(speed, jerk + own.delta * push)
+        slope = (linear + own.beta * (3 * z**2 * speed - speed**3)) * self.device.tau_per_s
+        changed = step.any(axis=(1, 2))
+        # Copies: a view would keep all of them in memory.
+        return [
+            Ramp(t_s=x, bias=bias[i].copy(), bias_slope=slope[i].copy()) if changed[i] else None
+            for i in range(len(changed))
+        ]

@@ -1,7 +1,8 @@
 """The library's own test corpus through the encoder: what is felt is what the authors of a table expect of it.
 
 The corpus (some 150 YAML files of liblouis, under several licences) is not kept here. DOTWAVE_LIBLOUIS_SPECS names a
-folder with those of the installed version (``tests/braille-specs`` of its source); else the source is fetched.
+folder with those of the installed version (``tests/braille-specs`` of its source); else the source is fetched, from
+Debian or from where liblouis releases it.
 """
 
 import io
@@ -18,7 +19,10 @@ import yaml
 
 from encoders import EncodeError, GridShape, TextOptions, TextSource, encode_text, join_pages, liblouis_version
 
-SOURCE = "https://github.com/liblouis/liblouis/releases/download/v{0}/liblouis-{0}.tar.gz"
+SOURCES = (
+    "https://deb.debian.org/debian/pool/main/libl/liblouis/liblouis_{0}.orig.tar.gz",
+    "https://github.com/liblouis/liblouis/releases/download/v{0}/liblouis-{0}.tar.gz",
+)
 SMALL, LARGE = GridShape(6, 6), GridShape(40, 96)
 # These ask for more than a text and a table.
 BEYOND = {"xfail", "typeform", "mode", "cursorPos", "maxOutputLength"}
@@ -39,17 +43,23 @@ def corpus() -> Iterator[tuple[str, str]]:
     if folder:
         yield from ((path.name, path.read_text()) for path in sorted(Path(folder).glob("*.yaml")))
         return
-    url = SOURCE.format(liblouis_version())
-    try:
-        with urllib.request.urlopen(url, timeout=60) as answer:
-            data = answer.read()
-    except (urllib.error.URLError, TimeoutError) as error:
-        pytest.skip(f"{url} cannot be fetched ({error}); name a folder in DOTWAVE_LIBLOUIS_SPECS")
-    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+    with tarfile.open(fileobj=io.BytesIO(fetched_source())) as archive:
         for member in archive:
             file = archive.extractfile(member) if "/braille-specs/" in member.name else None
             if file is not None and member.name.endswith(".yaml"):
                 yield Path(member.name).name, file.read().decode()
+
+
+def fetched_source() -> bytes:
+    refused = []
+    for url in (source.format(liblouis_version()) for source in SOURCES):
+        try:
+            with urllib.request.urlopen(url, timeout=60) as answer:
+                data: bytes = answer.read()
+                return data
+        except (urllib.error.URLError, TimeoutError) as error:
+            refused.append(f"{url}: {error}")
+    pytest.skip(f"not fetched: {'; '.join(refused)}; name a folder in DOTWAVE_LIBLOUIS_SPECS")
 
 
 def cases() -> Iterator[Case]:

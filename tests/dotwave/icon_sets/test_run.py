@@ -413,7 +413,7 @@ def test_names_cannot_break_the_page(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [b"my notes\n", b'{"mine": 1}\n', b"\0" * 100, b"[]"])
 def test_a_file_that_is_no_journal_is_refused_and_stays(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "journal.jsonl").write_bytes(content)
-    with pytest.raises(FileError, match=r"journal\.jsonl: not a journal of dotwave icons; give another folder"):
+    with pytest.raises(FileError, match=r"journal\.jsonl: not a journal of dotwave; give another folder"):
         render_icons([str(SAMPLES / "heart.svg")], tmp_path, ONE)
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("journal.jsonl", content)]
 

@@ -1,0 +1,3 @@
+"""Folders of texts, rendered as one job."""
+
+__all__: list[str] = []
