@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from heapq import merge
 
 import numpy as np
@@ -58,7 +58,7 @@ class GatedStream:
         moved = (link_coupling(link, self._found) for link in links)
         self._events = list(merge(self._events, events, moved, key=lambda event: event.at))
 
-    def messages(self, volts: NDArray[np.float64]) -> Iterator[Message]:
+    def messages(self, volts: NDArray[np.float64]) -> list[Message]:
         """The next samples, float64, shape (S, channels), volts, after the events within them.
 
         Raises
@@ -67,8 +67,7 @@ class GatedStream:
             When one is over a limit: nothing of the block is sent.
         """
         self.gate.check(volts)
-        stop = self._first + len(volts)
-        due = sum(event.at < stop for event in self._events)
-        yield from self._events[:due]
-        yield SamplesMessage(self._first, self._coder.codes(volts))
-        self._events, self._first = self._events[due:], stop
+        first, self._first = self._first, self._first + len(volts)
+        due = sum(event.at < self._first for event in self._events)
+        events, self._events = self._events[:due], self._events[due:]
+        return [*events, SamplesMessage(first, self._coder.codes(volts))]

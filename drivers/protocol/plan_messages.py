@@ -20,7 +20,7 @@ from .replies import Capabilities
 
 __all__ = ["plan_messages"]
 
-CHANGED = "stopped, the corrected samples are not safe"
+CHANGED = "stopped, what was corrected is not safe"
 
 
 def plan_messages(

@@ -28,8 +28,12 @@ from drivers import (
     session_messages,
     write_waveform,
 )
-from drivers.protocol.messages import SamplesMessage
+from drivers.protocol.messages import VERSION, LinkCoupling, Mark, SamplesMessage
+from drivers.protocol.outgoing import Message
 from drivers.protocol.plant import Sensors, TruePlant
+from drivers.protocol.playout import Event
+from drivers.protocol.record import _unpacked
+from drivers.sinks.controller import LEAD_S
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import Adaptation, EstimateError, Measured, Plan, plan_scene
 
@@ -80,10 +84,10 @@ class Played:
             self.adaptation.learned(measured)
 
         session = HostSession(
-            lambda found: plan_messages(self.manifest, frames, found, session=7, prefill_s=0.25, limits=limits)
+            lambda found: plan_messages(self.manifest, frames, found, session=7, prefill_s=LEAD_S / 2, limits=limits)
             if adapt
             else session_messages(self.manifest, reader, found, session=7),
-            session=7, timing=Timing(lead_s=0.5) if adapt else Timing(), on_measured=heard,
+            session=7, timing=Timing(lead_s=LEAD_S) if adapt else Timing(), on_measured=heard,
         )  # fmt: skip
         session.connected()
         now = 0.0
@@ -156,7 +160,7 @@ def messages(manifest: Manifest, plan: Plan, limits: GateLimits | None = None) -
     device = manifest.device
     found = VirtualController(ControllerSpec.of(device), now=0.0)._capabilities()
     limits = limits or GateLimits.of(device, len(manifest.channels))
-    sent = plan_messages(manifest, plan.frames, found, session=7, prefill_s=0.25, limits=limits)
+    sent = plan_messages(manifest, plan.frames, found, session=7, prefill_s=LEAD_S / 2, limits=limits)
     return np.concatenate([one.codes for one in sent if isinstance(one, SamplesMessage)])
 
 
@@ -172,12 +176,70 @@ def test_what_is_not_measured_is_not_corrected(tmp_path: Path, device: Device) -
     assert "Nothing was measured" in adaptation.report().as_lines()[0]
 
 
+@pytest.mark.parametrize("device", [LINKED, PAPER], ids=["vibrating", "held"])
+def test_marks_measures_and_links_are_those_of_the_file(tmp_path: Path, device: Device) -> None:
+    path, _ = written(tmp_path, device, 3)
+    manifest, reader = read_waveform(path)
+    bare = VirtualController(ControllerSpec.of(device), now=0.0)._capabilities()
+    found = replace(bare, version=VERSION, measures=True)
+    sent = session_messages(manifest, reader, found, session=7)
+    limits = GateLimits.of(device, len(manifest.channels))
+    drawn = plan_messages(manifest, plan_of(manifest).frames, found, session=7, prefill_s=LEAD_S / 2, limits=limits)
+    (plain, notes), (led, led_notes) = map(told, (sent, drawn))
+    assert led == plain
+    assert led_notes == notes
+    assert len(notes) == 3
+    assert all(notes)
+    assert any(isinstance(event, LinkCoupling) for event in plain)
+
+
+def told(sent: Iterator[Message]) -> tuple[list[Event], list[object]]:
+    """The events of a session, by sample and kind, and what the notes of its marks say."""
+    events = sorted(
+        (one for one in sent if not isinstance(one, SamplesMessage) and hasattr(one, "at")),
+        key=lambda event: (event.at, type(event).__name__),
+    )
+    notes = [_unpacked(event.note) for event in events if isinstance(event, Mark)]
+    return [replace(event, note=b"") if isinstance(event, Mark) else event for event in events], notes
+
+
+@pytest.mark.parametrize(("version", "most_s"), [(VERSION, 0.5), (3, 2.0)])
+def test_a_large_buffer_is_not_filled(
+    tmp_path: Path, version: int, most_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames that are not asked for can still be corrected; a controller of before wants half of its buffer."""
+    monkeypatch.setattr("drivers.protocol.virtual_controller.VERSION", version)
+    path, _ = written(tmp_path, LINKED, 6)
+    manifest, _ = read_waveform(path)
+    limits, rate = GateLimits.of(LINKED, len(manifest.channels)), manifest.rate_hz
+    controller = VirtualController(ControllerSpec.of(LINKED, buffer_s=4.0), now=0.0)
+    session = HostSession(
+        lambda found: plan_messages(
+            manifest, plan_of(manifest).frames, found, session=7, prefill_s=LEAD_S / 2, limits=limits
+        ),
+        session=7, timing=Timing(lead_s=LEAD_S),
+    )  # fmt: skip
+    session.connected()
+    now = most = 0.0
+    while not session.finished:
+        now += 0.005
+        assert now < 20.0
+        controller.receive(session.poll(now), now)
+        session.receive(controller.outgoing(), now)
+        most = max(most, (controller.playout.received - controller.playout.played) / rate)
+    assert session.report.underruns == 0
+    assert most_s - 0.1 < most < most_s + 0.02
+
+
 def test_no_sample_passes_the_gate_that_is_over_it(tmp_path: Path) -> None:
     path, _ = written(tmp_path, LINKED, 2)
     manifest, _ = read_waveform(path)
     low = replace(GateLimits.of(LINKED, 1), volts=5.0)
-    with pytest.raises(GateRefusal, match="stopped, the corrected samples are not safe: volts"):
+    with pytest.raises(GateRefusal, match="stopped, what was corrected is not safe: volts"):
         messages(manifest, plan_of(manifest), low)
+    loose = replace(GateLimits.of(LINKED, 1), lam_max=1e-3)
+    with pytest.raises(GateRefusal, match=r"stopped, what was corrected is not safe: lam of row 0"):
+        messages(manifest, plan_of(manifest), loose)
 
 
 def test_a_sensor_that_lies_leads_nowhere_far(tmp_path: Path) -> None:
