@@ -170,7 +170,7 @@ def play(
         if given.get("parametric"):
             raise AppError("--adapt and --parametric: what is corrected goes out as samples; leave one of them out")
         adaptation, plan = adapt.to(manifest)
-        given |= {"frames": plan.frames, "on_measured": adaptation.learned, "limits": limits}
+        given |= {"frames": plan.frames, "on_measured": adaptation.learned, "frame_limits": limits}
     with nullcontext() if address is None else open_sink(address, limits=limits, **given) as sink:
         gate, said = _checked(sink, manifest, reader, limits)
         report = PlayReport(

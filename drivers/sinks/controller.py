@@ -40,8 +40,8 @@ class Controller:
     parametric : send what the controller draws itself in place of samples, where waveform and controller allow it.
     on_measured : gets what the controller measured of each frame, where it does.
     frames : what is played in place of the samples, each frame drawn shortly before it goes out: a plan as long as they
-        are, for the same device, that is corrected meanwhile. Every sample of it is held against `limits`.
-    limits : None: those of the device.
+        are, for the same device, that is corrected meanwhile. Every sample of it is held against `frame_limits`.
+    frame_limits : as those of the gate; None: those of the device.
     """
 
     port: str
@@ -50,7 +50,7 @@ class Controller:
     parametric: bool = False
     on_measured: Callable[[Measured], None] | None = None
     frames: Iterable[FramePlan] | None = None
-    limits: GateLimits | None = None
+    frame_limits: GateLimits | None = None
 
     def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
         """Nothing more than the gate asks: what the controller can do is known once it answers."""
@@ -85,7 +85,7 @@ class Controller:
     def _messages(self, way: _Way, found: Capabilities, session: int) -> Iterator[Message]:
         if self.frames is None:
             return way.messages(found, session)
-        limits = self.limits or GateLimits.of(way.manifest.device, len(way.manifest.channels))
+        limits = self.frame_limits or GateLimits.of(way.manifest.device, len(way.manifest.channels))
         return plan_messages(way.manifest, self.frames, found, session=session, prefill_s=LEAD_S / 2, limits=limits)
 
     def close(self) -> None:

@@ -258,6 +258,13 @@ def test_a_sensor_that_lies_leads_nowhere_far(tmp_path: Path) -> None:
     assert adaptation.report().strange
 
 
+def test_a_dry_run_is_corrected_by_nothing(dotwave: Callable[..., Ended], tmp_path: Path) -> None:
+    path, _ = written(tmp_path, LINKED, 1)
+    ended = dotwave("play", path, "--adapt", "--port", tmp_path / "none")
+    assert ended.code == 0, ended.err
+    assert "gate passed" in ended.out
+
+
 def test_what_cannot_be_corrected_is_refused(dotwave: Callable[..., Ended], tmp_path: Path) -> None:
     path, _ = written(tmp_path, LINKED, 1)
     ended = dotwave("play", path, "--adapt")
