@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +15,9 @@ import numpy as np
 import pytest
 
 from chainsim import Device, load_device
-from dotwave.playing.adapting import plan_of
+from dotwave.playing.adapting import Adapting, plan_of
+from dotwave.playing.emulate import EmulateReport, emulate
+from dotwave.playing.play import play
 from drivers import (
     ControllerSpec,
     FeltGrid,
@@ -263,6 +269,39 @@ def test_a_dry_run_is_corrected_by_nothing(dotwave: Callable[..., Ended], tmp_pa
     ended = dotwave("play", path, "--adapt", "--port", tmp_path / "none")
     assert ended.code == 0, ended.err
     assert "gate passed" in ended.out
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_two_terminals(tmp_path: Path) -> None:
+    """The whole way to an emulated controller that measures; how busy the machine is decides nothing."""
+    device = load_device("linked-6x6")
+    (tmp_path / "plant.yaml").write_text("seed: 4\nsensors: {noise: 0.002}\n", encoding="utf-8")
+    page = np.array([PAGES[0]] * 6, dtype=np.complex128)
+    plan = plan_scene(Scene(GridShape(6, 6), (Frame(TargetPattern(page), 0.5),)), device)
+    path = write_waveform(plan, tmp_path / "sent.wav").samples_path
+    link, out, found = tmp_path / "port", io.StringIO(), list[EmulateReport]()
+
+    def other() -> None:
+        found.append(
+            emulate(
+                device="linked-6x6", link=link, plant=tmp_path / "plant.yaml", record=tmp_path / "arrived.wav",
+                once=True, seconds=600, buffer_s=10.0, watchdog_s=30.0, out=out,
+            )
+        )  # fmt: skip
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    try:
+        while not link.exists() and thread.is_alive():
+            time.sleep(0.01)
+        report = play(path, live=True, port=str(link), adapt=Adapting(), patience_s=100.0)
+    finally:
+        thread.join()
+    assert found[0].status.recorded == 1
+    assert report.as_dict()["stream"]["samples"] == round(report.duration_s * report.rate_hz)
+    assert report.as_dict()["adaptation"]["actuators"] == 36
+    arrived, _ = read_waveform(tmp_path / "arrived.wav")
+    assert len(arrived.frames) == 1
 
 
 def test_what_cannot_be_corrected_is_refused(dotwave: Callable[..., Ended], tmp_path: Path) -> None:
