@@ -88,6 +88,9 @@ from .protocol.packet import (
     Packet as Packet,
     PacketReader as PacketReader,
 )
+from .protocol.plan_messages import (
+    plan_messages as plan_messages,
+)
 from .protocol.plant_file import (
     PlantError as PlantError,
     PlantFile as PlantFile,

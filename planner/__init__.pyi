@@ -42,6 +42,10 @@ from .errors import (
     SceneDoesNotFit as SceneDoesNotFit,
     YieldError as YieldError,
 )
+from .identification.adaptation import (
+    Adaptation as Adaptation,
+    AdaptationReport as AdaptationReport,
+)
 from .identification.bias_estimate import (
     BiasEstimate as BiasEstimate,
 )

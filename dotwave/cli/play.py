@@ -46,6 +46,9 @@ def play(
     audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
     channels: Annotated[str | None, typer.Option("--map", help="Sound card outputs: channel:output,...")] = None,
     to: Annotated[str | None, typer.Option(metavar="NAME:PLACE", help="Any sink, also one of another package.")] = None,
+    adapt: Annotated[bool, typer.Option("--adapt", help="Correct while playing, from what is measured.")] = False,
+    noise: Annotated[float, typer.Option(min=0, max=0.5, help="Of a sensor, share of full scale; --adapt.")] = 0.002,
+    amplitudes: Annotated[bool, typer.Option("--amplitudes", help="The sensors tell no phases; --adapt.")] = False,
     as_json: Json = False,
 ) -> None:
     """Check a written waveform against the safety gate and, with --live, play it.
@@ -53,18 +56,23 @@ def play(
     Nothing leaves this machine without --live, and nothing at all when a sample is over a limit. Ctrl-C ramps
     the output to zero. The exit code is 1 when the buffer ran dry or the output was held on the way.
 
+    With --adapt a controller that measures is sent its frames half a second ahead, each corrected by what was measured
+    of those before; every sample of them is held against the gate as it goes out.
+
     \b
     Example:
       dotwave play hello.wav --port /dev/ttyACM0 --live
     """
     from drivers import Firmware
 
+    from ..playing.adapting import Adapting
     from ..playing.play import play as run
 
     report = run(
         Path(out), live=live, port=port, board=board is not None, audio=audio, to=to, baud=baud, patience_s=patience,
         parametric=parametric or None,
         firmware=None if firmware is None else Firmware(firmware.value), mapping=channels,
+        adapt=Adapting(noise, not amplitudes) if adapt else None,
     )  # fmt: skip
     finish(report, as_json, ok=report.ok)
 

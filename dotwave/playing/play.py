@@ -24,6 +24,7 @@ from drivers import (
 
 from ..errors import AppError
 from ..progress import progress
+from .adapting import Adapting
 
 __all__ = ["PlayReport", "PortsReport", "list_ports", "play"]
 
@@ -134,6 +135,7 @@ def play(
     audio: str | None = None,
     to: str | None = None,
     limits: GateLimits | None = None,
+    adapt: Adapting | None = None,
     **options: object,
 ) -> PlayReport:
     """Hold a written waveform against the safety gate and, when `live`, play it.
@@ -145,6 +147,7 @@ def play(
     to : any sink, as ``name:place``.
     limits : of the actuators and the amplifier where they are known; None: those of the
         profile.
+    adapt : correct while playing, from what the controller measures.
     options : of the sink (`drivers.open_sink`); None is left out.
 
     Raises
@@ -160,6 +163,14 @@ def play(
     manifest, reader = read_waveform(path)
     limits = limits or GateLimits.of(manifest.device, len(manifest.channels))
     given = {name: value for name, value in options.items() if value is not None}
+    adaptation = None
+    if adapt is not None:
+        if address is None or not address.startswith("controller:"):
+            raise AppError("--adapt: only a controller measures what it plays; give its --port")
+        if given.get("parametric"):
+            raise AppError("--adapt and --parametric: what is corrected goes out as samples; leave one of them out")
+        adaptation, plan = adapt.to(manifest)
+        given |= {"frames": plan.frames, "on_measured": adaptation.learned, "frame_limits": limits}
     with nullcontext() if address is None else open_sink(address, limits=limits, **given) as sink:
         gate, said = _checked(sink, manifest, reader, limits)
         report = PlayReport(
@@ -172,6 +183,11 @@ def play(
         began = time.perf_counter()
         with progress("playing") as update:
             said = sink.play(manifest, reader, lambda done: update(done, manifest.duration_s))
+        if adaptation is not None:
+            told = adaptation.report()
+            said = replace(
+                said, facts={**said.facts, "adaptation": told.as_dict()}, lines=(*said.lines, *told.as_lines())
+            )
         return replace(report, said=said, seconds=time.perf_counter() - began)
 
 

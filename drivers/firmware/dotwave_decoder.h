@@ -103,7 +103,7 @@ static inline int dw_length_fits(uint8_t kind, uint32_t length)
     case DW_ACK: fixed = 58; item = 4; break;
     case DW_MARKED: fixed = 20; item = 0; break;
     case DW_REFUSED: fixed = 4; item = 1; break;
-    case DW_MEASURED: fixed = 10; item = 12; break;
+    case DW_MEASURED: fixed = 10; item = 24; break;
     case DW_KEY: fixed = 4; item = 2; break;
     default: return 0;
     }

@@ -6,7 +6,8 @@
  *     if (dw_read_measure(&in.packet, &ask)) begin(&ask);          // a MEASURE, checked for its length
  *     ...                                                          // for each sample k of the window:
  *     phase = dw_turns(&ask, row) * k;                             // 2^64 is a whole turn
- *     dw_sense(&window, u, cosine(phase), sine(phase));
+ *     place = (k - ask.at + 0.5) / ask.samples;                    // turns: one from end to end of the window
+ *     dw_sense(&window, u, cosine(phase), sine(phase), cosine(place), sine(place));
  *     ...                                                          // after its last sample:
  *     dw_begin_measured(payload, session, ask.frame, first);
  *     dw_put_measured(payload, i, dw_fit(&window, dw_turns(&ask, row) != 0));    // actuator first + i
@@ -22,7 +23,7 @@
 #define DW_MEASURES 1u          /* bit of CAPABILITIES.flags */
 #define DW_MEASURE_HEAD 16u     /* bytes before the phases */
 #define DW_MEASURED_HEAD 10u    /* bytes before the numbers */
-#define DW_MEASURED_EACH 12u    /* bytes of an actuator */
+#define DW_MEASURED_EACH 24u    /* bytes of an actuator */
 #define DW_MEASURED_MOST ((DW_MAX_PAYLOAD - DW_MEASURED_HEAD) / DW_MEASURED_EACH) /* actuators in one packet */
 
 typedef struct {
@@ -34,13 +35,13 @@ typedef struct {
 } dw_measure;
 
 typedef struct {
-    float mean, real, imaginary;
+    float mean, real, imaginary, change_real, change_imaginary, rest;
 } dw_fitted;
 
-/* Sums over the samples of a window: of 1, cos and -sin with each other, and with what is sensed. */
+/* Sums over the samples of a window, weighted: of 1, cos and -sin with each other, and with what is sensed; of what is
+ * sensed with itself; and of cos and -sin with what is sensed, by the slope of the weight. */
 typedef struct {
-    double c, s, cc, cs, ss, u, uc, us;
-    uint32_t count;
+    double n, c, s, cc, cs, ss, u, uc, us, uu, tc, ts;
 } dw_window;
 
 /* 1 when `packet` is a MEASURE with a phase for at least one row. */
@@ -61,18 +62,22 @@ static inline uint64_t dw_turns(const dw_measure *ask, uint32_t row)
     return dw_u64(ask->turns + 8u * (row < ask->rows ? row : ask->rows - 1u));
 }
 
-static inline void dw_sense(dw_window *w, float u, float cosine, float sine)
+/* One sample: what is sensed, cosine and sine of the drive's phase, and those of its place in the window. */
+static inline void dw_sense(dw_window *w, float u, float cosine, float sine, float place_cosine, float place_sine)
 {
-    double c = cosine, s = -(double)sine;
-    w->count++;
-    w->c += c;
-    w->s += s;
-    w->cc += c * c;
-    w->cs += c * s;
-    w->ss += s * s;
-    w->u += u;
-    w->uc += u * c;
-    w->us += u * s;
+    double c = cosine, s = -(double)sine, weight = 0.5 - 0.5 * place_cosine, slope = 3.14159265358979 * place_sine;
+    w->n += weight;
+    w->c += weight * c;
+    w->s += weight * s;
+    w->cc += weight * c * c;
+    w->cs += weight * c * s;
+    w->ss += weight * s * s;
+    w->u += weight * u;
+    w->uc += weight * u * c;
+    w->us += weight * u * s;
+    w->uu += weight * u * u;
+    w->tc += slope * u * c;
+    w->ts += slope * u * s;
 }
 
 static inline float dw_nan(void)
@@ -86,10 +91,12 @@ static inline float dw_nan(void)
 static inline dw_fitted dw_fit(const dw_window *w, int vibrates)
 {
     dw_fitted fit;
-    double n = w->count, cc, cs, ss, uc, us, det;
-    fit.mean = fit.real = fit.imaginary = dw_nan();
-    if (!w->count) return fit;
+    double n = w->n, mean, real, imaginary, rest, cc, cs, ss, uc, us, det;
+    fit.mean = fit.real = fit.imaginary = fit.change_real = fit.change_imaginary = fit.rest = dw_nan();
+    if (!(n > 0)) return fit;
     fit.mean = (float)(w->u / n);
+    rest = (w->uu - w->u * w->u / n) / n;
+    fit.rest = (float)(rest > 0 ? rest : 0);
     /* Deviations from the means leave two equations of two unknowns. */
     cc = w->cc - w->c * w->c / n;
     cs = w->cs - w->c * w->s / n;
@@ -98,9 +105,16 @@ static inline dw_fitted dw_fit(const dw_window *w, int vibrates)
     us = w->us - w->u * w->s / n;
     det = cc * ss - cs * cs;
     if (!vibrates || det <= 1e-9 * n * n) return fit;
-    fit.real = (float)((uc * ss - us * cs) / det);
-    fit.imaginary = (float)((us * cc - uc * cs) / det);
-    fit.mean = (float)((w->u - w->c * (uc * ss - us * cs) / det - w->s * (us * cc - uc * cs) / det) / n);
+    real = (uc * ss - us * cs) / det;
+    imaginary = (us * cc - uc * cs) / det;
+    mean = (w->u - w->c * real - w->s * imaginary) / n;
+    rest = (w->uu - mean * w->u - real * w->uc - imaginary * w->us) / n;
+    fit.real = (float)real;
+    fit.imaginary = (float)imaginary;
+    fit.mean = (float)mean;
+    fit.change_real = (float)(-2 * w->tc / n);
+    fit.change_imaginary = (float)(-2 * w->ts / n);
+    fit.rest = (float)(rest > 0 ? rest : 0);
     return fit;
 }
 
@@ -125,6 +139,9 @@ static inline void dw_put_measured(uint8_t *payload, uint32_t i, dw_fitted fit)
     dw_put_f32(p, fit.mean);
     dw_put_f32(p + 4, fit.real);
     dw_put_f32(p + 8, fit.imaginary);
+    dw_put_f32(p + 12, fit.change_real);
+    dw_put_f32(p + 16, fit.change_imaginary);
+    dw_put_f32(p + 20, fit.rest);
 }
 
 #endif

@@ -10,12 +10,12 @@ from chainsim import Device
 from planner import FramePlan
 
 from ..channels import channels_of
-from ..protocol.messages import Mark, SamplesMessage, StartMessage
-from ..protocol.outgoing import Coder, End, Message, block_of, check_fit_for, fitting, link_coupling
-from ..protocol.playout import Event
+from ..protocol.gated import GatedStream
+from ..protocol.messages import Mark
+from ..protocol.outgoing import MARK_FIXED, End, Message, check_fit_for, fitting, start_of
 from ..protocol.record import device_note, live_note
 from ..protocol.replies import OPEN_SINCE, Capabilities
-from ..safety import Gate, GateLimits, GateRefusal, check_links
+from ..safety import GateLimits, GateRefusal
 from ..waveform.coupling import CouplingWriter
 from ..waveform.frame_entry import frame_entry
 from .wave import LiveWave
@@ -76,20 +76,15 @@ class LiveMessages:
         prefill_s: float, limits: GateLimits | None = None,
     ) -> None:  # fmt: skip
         check_fit_for(device, found, device.coupling.lam.max)
-        channels = channels_of(device)
         self._device, self._found, self._source = device, found, source
         self._wave, self._links = LiveWave(device), CouplingWriter(device)
-        self._limits = limits or GateLimits.of(device, len(channels))
-        self._gate = Gate(self._limits, channels, found.rate_hz, refused=REFUSED)
-        self._coder, self._block = Coder(channels, found.full_volts), block_of(found)
+        self._limits = limits or GateLimits.of(device, len(channels_of(device)))
+        self._stream = GatedStream(device, found, self._limits, refused=REFUSED)
         self._open = found.version >= OPEN_SINCE
         self._again_at = self._frames = 0
         self._silent_until: int | None = None
         self._refused_from: int | None = None  # since when ways were too much
-        self._events: deque[Event] = deque()
-        prefill = max(1, round(prefill_s * found.rate_hz)) if self._open else 0
-        note = fitting(device_note(device, encoding), found, 21)
-        start = StartMessage(session, False, found.rate_hz, 0 if self._open else NEVER, note, prefill)
+        start = start_of(session, found, 0 if self._open else NEVER, device_note(device, encoding), prefill_s)
         self._due: deque[Message] = deque([start])
         self._ended = False
 
@@ -122,12 +117,7 @@ class LiveMessages:
                 self._end()
                 if self._ended:
                     return
-        first = wave.position
-        volts = wave.block(self._block)
-        self._gate.check(volts)
-        while self._events and self._events[0].at < wave.position:
-            self._due.append(self._events.popleft())
-        self._due.append(SamplesMessage(first, self._coder.codes(volts)))
+        self._due.extend(self._stream.messages(wave.block(self._stream.block)))
 
     def _end(self) -> None:
         position = self._wave.position
@@ -148,17 +138,14 @@ class LiveMessages:
         except GateRefusal as refusal:
             self._wait(refusal, way)
             return
-        links = self._links.events(placed)
-        check_links(links, self._limits, refused=REFUSED)
-        self._events.extend(self._marked(placed))
-        self._events.extend(link_coupling(event, self._found) for event in links)
+        self._stream.expect([self._mark(placed)], self._links.events(placed))
         self._refused_from = None
         wave.begin(placed)
         self._source.began(placed)
 
     def _check(self, placed: FramePlan) -> None:
         """Hold a way against the gate, with all windows in which its pattern stands; nothing is sent."""
-        gate, window = self._gate.trial(), round(self._limits.window_s * self._found.rate_hz)
+        gate, window = self._stream.gate.trial(), round(self._limits.window_s * self._found.rate_hz)
         if any(state.moving for state in placed.states):
             gate.check(self._wave.ahead(placed, window))
         else:
@@ -177,8 +164,8 @@ class LiveMessages:
         if way.frame is not None and (not passes or position - self._refused_from > self._limits.window_s * rate):
             self._source.refused(str(refusal))
 
-    def _marked(self, placed: FramePlan) -> Iterator[Event]:
+    def _mark(self, placed: FramePlan) -> Mark:
         entry = None if placed.frame is None else frame_entry(self._device, placed, self._frames)
-        note = fitting(live_note(entry, placed.start_s), self._found, 12)
-        yield Mark(self._wave.position, self._frames, note)
+        note = fitting(live_note(entry, placed.start_s), self._found, MARK_FIXED)
         self._frames += 1
+        return Mark(self._wave.position, self._frames - 1, note)

@@ -16,6 +16,7 @@ from .packet import MAX_PAYLOAD, Kind, Packet
 __all__ = ["Measure", "MeasuredFrames", "MeasuredPart", "parts_of", "turns_of"]
 
 WHOLE_TURN = 1 << 64
+EACH = 6  # numbers of an actuator
 
 
 def turns_of(omega: float, dtau: float) -> int:
@@ -64,7 +65,7 @@ class MeasuredPart:
     session : in which it was asked for.
     frame : as in `Measured`.
     first : the first actuator, counted row by row.
-    values : float32, shape (k, 3): mean, real and imaginary part of the harmonic.
+    values : float32, shape (k, 6): mean, real and imaginary part of the harmonic and of its change, rest.
     """
 
     session: int
@@ -83,14 +84,17 @@ class MeasuredPart:
     def of(cls, packet: Packet) -> MeasuredPart:
         """From bytes."""
         flat = np.frombuffer(packet.payload, dtype="<f4", offset=cls._struct.size)
-        values = flat.reshape(-1, 3).astype(np.float32, copy=False)
+        values = flat.reshape(-1, EACH).astype(np.float32, copy=False)
         return cls(*(*cls._struct.unpack_from(packet.payload), values))
 
 
 def parts_of(measured: Measured, session: int, max_payload: int = MAX_PAYLOAD) -> list[MeasuredPart]:
     """A frame cut into packets, its actuators in order; float32."""
-    values = np.stack([measured.mean, measured.harmonic.real, measured.harmonic.imag], axis=1).astype(np.float32)
-    most = max(1, (min(max_payload, MAX_PAYLOAD) - MeasuredPart._struct.size) // 12)
+    change = np.full_like(measured.harmonic, np.nan) if measured.change is None else measured.change
+    rest = np.full_like(measured.mean, np.nan) if measured.rest is None else measured.rest
+    parts = measured.mean, measured.harmonic.real, measured.harmonic.imag, change.real, change.imag, rest
+    values = np.stack(parts, axis=1).astype(np.float32)
+    most = max(1, (min(max_payload, MAX_PAYLOAD) - MeasuredPart._struct.size) // (4 * EACH))
     return [
         MeasuredPart(session, measured.frame, first, values[first : first + most])
         for first in range(0, len(values), most)
@@ -110,7 +114,7 @@ class MeasuredFrames:
 
     def __init__(self, session: int, actuators: int) -> None:
         self._session = session
-        self._values = np.full((actuators, 3), np.nan)
+        self._values = np.full((actuators, EACH), np.nan)
         self._here = np.zeros(actuators, dtype=bool)
         self._frame = -1
 
@@ -127,5 +131,5 @@ class MeasuredFrames:
         self._values[place], self._here[place] = part.values, True
         if not self._here.all():
             return None
-        mean, real, imaginary = self._values.T
-        return Measured(part.frame, mean.copy(), real + 1j * imaginary)
+        mean, real, imaginary, change, turning, rest = self._values.T
+        return Measured(part.frame, mean.copy(), real + 1j * imaginary, change + 1j * turning, rest.copy())

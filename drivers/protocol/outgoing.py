@@ -6,6 +6,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +24,16 @@ from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Mark, SamplesMess
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
-from .replies import Capabilities
+from .replies import OPEN_SINCE, Capabilities
 
 __all__ = [
-    "Coder", "End", "Message", "UnfitController", "block_of", "check_fit", "check_fit_for", "fitting", "link_coupling",
-    "links_of", "marks_of", "session_messages",
+    "MARK_FIXED", "Coder", "End", "Message", "UnfitController", "block_of", "check_fit", "check_fit_for", "fitting",
+    "link_coupling", "links_of", "marks_of", "measures", "session_messages", "start_of",
 ]  # fmt: skip
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
-START_FIXED = 17  # bytes before START's note
+START_FIXED, PREFILL_FIXED, MARK_FIXED = 17, 4, 12  # bytes before the notes of START and MARK
 
 
 class UnfitController(DriverError, ValueError):
@@ -122,9 +123,7 @@ def session_messages(
 
 
 def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, session: int) -> Iterator[Message]:
-    yield StartMessage(
-        session, False, manifest.rate_hz, manifest.samples, fitting(scene_note(manifest), found, START_FIXED)
-    )
+    yield start_of(session, found, manifest.samples, scene_note(manifest))
     waiting = merge(
         links_of(manifest, found), marks_of(manifest, found), _measures(manifest, found), key=lambda event: event.at
     )
@@ -137,6 +136,19 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
         yield SamplesMessage(first, coder.codes(volts))
         first += len(volts)
     yield End(first)
+
+
+def start_of(session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0) -> StartMessage:
+    """START, its note where there is room for it.
+
+    Parameters
+    ----------
+    total : samples; 0 is open.
+    prefill_s : seconds in store that are enough to begin, where the controller knows of that; 0: half of its buffer.
+    """
+    prefill = max(1, round(prefill_s * found.rate_hz)) if prefill_s and found.version >= OPEN_SINCE else 0
+    fixed = START_FIXED + (PREFILL_FIXED if prefill else 0)
+    return StartMessage(session, False, found.rate_hz, total, fitting(note, found, fixed), prefill)
 
 
 def block_of(found: Capabilities) -> int:
@@ -183,27 +195,47 @@ def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling:
 def marks_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     """A mark for each frame."""
     for number, mark in enumerate(manifest.frames):
-        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, 12))
+        yield Mark(round(mark.start_s * manifest.rate_hz), number, fitting(frame_note(mark), found, MARK_FIXED))
 
 
 def _measures(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
-    """A window for each frame, where the controller measures: the second half of the time its pattern stands.
-
-    What is left there of the way in, where actuators are not as planned, has had the first half to fade.
-    """
-    if not found.measures:
-        return
-    device, rate = manifest.device, manifest.rate_hz
     for number, mark in enumerate(manifest.frames):
-        at, stop = round((mark.settled_s + mark.end_s) / 2 * rate), round(mark.end_s * rate)
-        # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
-        others = float(mark.omega.max()) if device.bias == "none" else 0.0
-        asked = [omega if moving else others for omega, moving in zip(mark.omega.tolist(), mark.moving, strict=True)]
-        turns = [turns_of(omega, device.tau_per_s / rate) if omega else 0 for omega in asked]
-        while len(turns) > 1 and turns[-1] == turns[-2]:
-            turns.pop()
-        if stop > at and len(turns) <= Measure.most(found.max_payload):
-            yield Measure(at, stop - at, number, tuple(turns))
+        yield from measures(manifest.device, number, mark, mark.omega.tolist(), mark.moving, found)
+
+
+class _Stands(Protocol):
+    """A frame, planned or written: when its pattern stands, in seconds."""
+
+    @property
+    def settled_s(self) -> float: ...
+
+    @property
+    def end_s(self) -> float: ...
+
+
+def measures(
+    device: Device, number: int, frame: _Stands, omega: Sequence[float], moving: Sequence[bool], found: Capabilities
+) -> Iterator[Measure]:
+    """A window for a frame, where the controller measures: the second half of the time its pattern stands.
+
+    What is left there of the way in, where actuators are not as planned, has had the first half to fade. Nothing is
+    asked for where it does not fit into a packet.
+
+    Parameters
+    ----------
+    number : of the frame, from 0.
+    omega, moving : of each row.
+    """
+    rate = device.amplifier.rate_hz
+    at, stop = round((frame.settled_s + frame.end_s) / 2 * rate), round(frame.end_s * rate)
+    # Without a bias, what moves in a row that is to rest is asked for at the frequency of the others.
+    others = max(omega) if device.bias == "none" else 0.0
+    asked = [one if moves else others for one, moves in zip(omega, moving, strict=True)]
+    turns = [turns_of(one, device.tau_per_s / rate) if one else 0 for one in asked]
+    while len(turns) > 1 and turns[-1] == turns[-2]:
+        turns.pop()
+    if found.measures and stop > at and len(turns) <= Measure.most(found.max_payload):
+        yield Measure(at, stop - at, number, tuple(turns))
 
 
 def fitting(note: bytes, found: Capabilities, fixed: int) -> bytes:

@@ -84,7 +84,7 @@ SHAPES = {
     Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),
     Kind.REFUSED: Shape(4, 1),
-    Kind.MEASURED: Shape(10, 12),
+    Kind.MEASURED: Shape(10, 24),
     Kind.KEY: Shape(4, 2),
 }
 

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 NUMBERS = ("frequency", "damping", "beta", "lam", "force")
 LEAST_FACTOR = 0.1
+# Noise of a change over that of a harmonic, by the window's slope and its weight.
+CHANGE_NOISE = 3.6
 STEP = 64  # played samples for which stiffness and damping stay as they are
 
 
@@ -144,5 +146,7 @@ class Sensors:
 
     def read(self, measured: Measured) -> Measured:
         """The same with the noise of the reading, drawn anew each time."""
-        mean, real, imaginary = self._noise * self._random.standard_normal((3, len(measured.mean)))
-        return Measured(measured.frame, measured.mean + mean, measured.harmonic + (real + 1j * imaginary))
+        mean, real, imaginary, *both = self._noise * self._random.standard_normal((5, len(measured.mean)))
+        change = None if measured.change is None else measured.change + CHANGE_NOISE * (both[0] + 1j * both[1])
+        harmonic = measured.harmonic + (real + 1j * imaginary)
+        return Measured(measured.frame, measured.mean + mean, harmonic, change, measured.rest)

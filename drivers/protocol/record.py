@@ -22,14 +22,21 @@ from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
 from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
-__all__ = ["ArrivalRecorder", "CutShort", "device_note", "frame_note", "live_note", "scene_note"]
+__all__ = ["ArrivalRecorder", "CutShort", "device_note", "frame_note", "live_note", "plan_note", "scene_note"]
 
 MOST_NOTE_BYTES = 1 << 20
+# What a manifest has of a frame, and a note has no room for.
+NOT_NOTED = ("tones", "phase", "spread")
 
 
 def scene_note(manifest: Manifest) -> bytes:
     """What START tells a recorder: how to read the frames as text."""
     return device_note(manifest.device, manifest.encoding)
+
+
+def plan_note(entry: Mapping[str, Any]) -> bytes:
+    """The same as `frame_note`, of what stands in a manifest of a frame (`frame_entry`)."""
+    return _packed({key: value for key, value in entry.items() if key not in NOT_NOTED})
 
 
 def frame_note(mark: FrameMark) -> bytes:

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from planner import Measured
+from planner import FramePlan, Measured
 
 from ..formats.samples import SampleReader
 from ..protocol.host_session import HostSession, StreamReport, Timing
 from ..protocol.outgoing import Message, session_messages
 from ..protocol.parametric import ENVELOPES_SINCE, NotParametric, ParametricSession
+from ..protocol.plan_messages import plan_messages
 from ..protocol.playout import BUFFER_S
 from ..protocol.replies import Capabilities
+from ..safety import GateLimits
 from ..waveform.manifest import Manifest
 from .base import SinkError, SinkReport
 from .serial_play import run_session
 from .uart import Uart
 
-__all__ = ["Controller", "buffer_notes"]
+__all__ = ["LEAD_S", "Controller", "buffer_notes"]
+
+LEAD_S = 0.5
+"""Seconds that frames which are still corrected go out ahead: enough for a host with little else to do."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,9 @@ class Controller:
     patience_s : how long to wait for a controller that is not heard.
     parametric : send what the controller draws itself in place of samples, where waveform and controller allow it.
     on_measured : gets what the controller measured of each frame, where it does.
+    frames : what is played in place of the samples, each frame drawn shortly before it goes out: a plan as long as they
+        are, for the same device, that is corrected meanwhile. Every sample of it is held against `frame_limits`.
+    frame_limits : as those of the gate; None: those of the device.
     """
 
     port: str
@@ -41,6 +49,8 @@ class Controller:
     patience_s: float = 10.0
     parametric: bool = False
     on_measured: Callable[[Measured], None] | None = None
+    frames: Iterable[FramePlan] | None = None
+    frame_limits: GateLimits | None = None
 
     def check(self, manifest: Manifest, samples: SampleReader) -> SinkReport:
         """Nothing more than the gate asks: what the controller can do is known once it answers."""
@@ -57,10 +67,12 @@ class Controller:
         if not self.port:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
-        way = _Way.of(manifest, samples) if self.parametric else _Way(manifest, samples)
+        drawn = self.parametric and self.frames is None
+        way = _Way.of(manifest, samples) if drawn else _Way(manifest, samples)
         session = HostSession(
-            lambda found: way.messages(found, number), session=number, timing=Timing(), on_measured=self.on_measured
-        )
+            lambda found: self._messages(way, found, number), session=number,
+            timing=Timing() if self.frames is None else Timing(lead_s=LEAD_S), on_measured=self.on_measured,
+        )  # fmt: skip
         run_session(session, self._line, patience_s=self.patience_s, progress=progress)
         stream = session.report
         return SinkReport(
@@ -69,6 +81,12 @@ class Controller:
             lines=_lines(stream),
             notes=way.notes(stream),
         )
+
+    def _messages(self, way: _Way, found: Capabilities, session: int) -> Iterator[Message]:
+        if self.frames is None:
+            return way.messages(found, session)
+        limits = self.frame_limits or GateLimits.of(way.manifest.device, len(way.manifest.channels))
+        return plan_messages(way.manifest, self.frames, found, session=session, prefill_s=LEAD_S / 2, limits=limits)
 
     def close(self) -> None:
         """Nothing stays open after `play`."""

@@ -61,7 +61,7 @@ class _Balance:
     """The moduli of one page's balances, of the stages whose amplitudes are known at both ends."""
 
     def __init__(self, page: ChainPage, noise: SensorNoise) -> None:
-        self._noise = noise.of(page.phasor)
+        self._noise = page.noise(noise)
         size = np.abs(page.phasor)
         self._omega, self._cubic = page.omega, 0.75 * size**2
         self._lam = np.append(0.0, page.lam)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +15,11 @@ from chainsim import Device, Outcome
 from ..operating_point import OperatingPoint
 from ..plan import FramePlan, Plan, Ramp
 from .bias_history import BiasHistory
-from .device_estimate import EstimateError
+from .device_estimate import TOLD, EstimateError
 from .measurement import Measured
 from .stages import SensorNoise
 
-__all__ = ["BiasEstimate"]
+__all__ = ["BiasEstimate", "Held"]
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +28,7 @@ RADII = np.array([1 / 16, 1 / 8, 1 / 4, 1 / 2])
 # What is taken to be known before any page, standard deviations: what a volt makes, relative; the weights of all plays
 # together (a loop of 10 % is usual); creep a decade.
 BASE, LOOP, CREEP = 0.05, 0.1, 0.02
+WIDE = np.array([BASE, *np.full(len(RADII), LOOP / np.sqrt(len(RADII))), CREEP])
 # Resonance periods in which the volts go out at the end, as deflections do.
 WAY_OUT_PERIODS = 8
 
@@ -64,8 +67,7 @@ class BiasEstimate:
         count, size = device.rows * device.cols, len(RADII) + 2
         mean = np.zeros((count, size))
         mean[:, 0] = 1.0
-        wide = np.array([BASE, *np.full(len(RADII), LOOP / np.sqrt(len(RADII))), CREEP])
-        covariance, rest = np.tile(np.diag(wide**2), (count, 1, 1)), BiasHistory.at_rest(count, np.zeros(0))
+        covariance, rest = np.tile(np.diag(WIDE**2), (count, 1, 1)), BiasHistory.at_rest(count, np.zeros(0))
         estimate = cls(device, mean, covariance, rest)
         return replace(estimate, history=estimate._fresh)
 
@@ -129,6 +131,30 @@ class BiasEstimate:
         """
         return replace(plan, frames=_Corrected(self, plan))
 
+    def faded(self, share: float) -> BiasEstimate:
+        """As much surer than before any page as is left when a share of it has faded; the numbers stay."""
+        return replace(self, covariance=(1 - share) * self.covariance + share * np.diag(WIDE**2))
+
+    def held(self, frame: FramePlan, before: Held, most: float = math.inf) -> tuple[FramePlan, Held]:
+        """One frame with voltages that hold its deflections, from what is remembered on; and what is held then.
+
+        `most` : by which forces may leave those of the frame.
+        """
+        wanted, set_to, stays = before
+        force = np.concatenate([state.bias for state in frame.states])
+        found = self.history.inverse(force, self.mean, 0.75 * (frame.end_s - frame.settled_s))
+        found = np.clip(found, force - most, force + most)
+        # What stays as it is gets no step, and the way out ends without volts.
+        stays = stays | (frame.settled_s <= frame.start_s)
+        found = np.where(stays & (force == wanted), set_to, found) if frame.frame else np.zeros_like(found)
+        done = _led(frame, self.device.chain_length, (wanted, force), (set_to, found))
+        return done, Held(force, found, np.ones_like(stays))
+
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Of which actuators the pages told what a volt makes; bool, shape (actuators,)."""
+        return np.asarray(self.covariance[:, 0, 0] < (TOLD * BASE) ** 2, dtype=np.bool_)
+
     @property
     def _fresh(self) -> BiasHistory:
         return BiasHistory.at_rest(len(self.mean), RADII * self.full_force)
@@ -154,6 +180,21 @@ class BiasEstimate:
         return np.concatenate([np.broadcast_to(getattr(chain, name), device.chain_length) for chain in chains])
 
 
+class Held(NamedTuple):
+    """What actuators are to be held at, what they are set to for it, float64, and whether the latter stays as it is;
+    shape (actuators,) each.
+    """
+
+    wanted: Floats
+    set_to: Floats
+    stays: NDArray[np.bool_]
+
+    @classmethod
+    def at_rest(cls, actuators: int) -> Held:
+        """Nothing held."""
+        return cls(np.zeros(actuators), np.zeros(actuators), np.zeros(actuators, dtype=np.bool_))
+
+
 class _Corrected:
     """The frames of a plan with other voltages, as often as they are asked for."""
 
@@ -162,24 +203,17 @@ class _Corrected:
 
     def __iter__(self) -> Iterator[FramePlan]:
         known, device = self._known, self._known.device
-        wanted = set_to = np.zeros(len(known.mean))
-        end_s, stays = 0.0, np.zeros(len(known.mean), dtype=np.bool_)
+        held, end_s = Held.at_rest(len(known.mean)), 0.0
         for frame in self._plan.frames:
-            hold_s = frame.end_s - frame.settled_s
-            force = np.concatenate([state.bias for state in frame.states])
-            found = known.history.inverse(force, known.mean, 0.75 * hold_s)
-            # What stays as it is gets no step, and the way out ends without volts.
-            stays |= frame.settled_s <= frame.start_s
-            found = np.where(stays & (force == wanted), set_to, found) if frame.frame else np.zeros_like(found)
-            done = _led(frame, device.chain_length, (wanted, force), (set_to, found))
-            most = float(np.abs(found).max())
+            done, held = known.held(frame, held)
+            most = float(np.abs(held.set_to).max())
             if frame.outcome is Outcome.OK and most > device.bias_max:
                 takes = f"it takes {most / device.bias_per_volt:.3g} V"
                 note = f"{device.name} cannot hold this pattern as it was found to be: {takes}."
                 done = replace(done, outcome=Outcome.UNREACHABLE, note=note)
             yield done
-            known = known.after(done, None, SensorNoise(0.0))
-            wanted, set_to, end_s, stays = force, found, frame.end_s, np.ones_like(stays)
+            known, end_s = known.after(done, None, SensorNoise(0.0)), frame.end_s
+        wanted, set_to, _ = held
         if set_to.any():
             # The plan thought itself at rest: what held off loops and creep still goes out.
             ramp_s = WAY_OUT_PERIODS / device.f0_hz

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any
@@ -17,7 +17,7 @@ from ..operating_point import OperatingPoint
 from ..robustness.spread import RelativeSpread, known_spread
 from .amplitudes import PAGES_KEPT, fit_amplitudes
 from .measurement import Measured
-from .stages import NUMBERS, ChainEstimate, ChainPage, SensorNoise
+from .stages import ChainEstimate, ChainPage, SensorNoise
 
 __all__ = ["DeviceEstimate", "EstimateError", "prior_spread"]
 
@@ -29,10 +29,11 @@ ASSUMED = RelativeSpread(f0=0.01, delta=0.05, beta=0.1, lam=0.02)
 ASSUMED_DRIVE = 0.03
 # Half width of a 95 % confidence interval over its standard deviation.
 HALF_WIDTH = NormalDist().inv_cdf(0.975)
-# A number may leave what was known by so many standard deviations: what lies farther off is no actuator of the device.
-FARTHEST = 10.0
 # A number is told where its standard deviation has become this share of what it was, or less.
 TOLD = 0.7
+# Of a device in use this share of what was known fades with every page; and a page whose balances lie so many variances
+# off, in the mean, is one of a chain that has changed.
+FADED, SURPRISE = 0.001, 8.0
 
 
 class EstimateError(PlanError, ValueError):
@@ -83,7 +84,13 @@ class DeviceEstimate:
         return cls(device, prior, prior, ((),) * len(prior))
 
     def after(
-        self, states: Sequence[OperatingPoint], measured: Measured, noise: SensorNoise, *, phases: bool = True
+        self,
+        states: Sequence[OperatingPoint],
+        measured: Measured,
+        noise: SensorNoise,
+        *,
+        phases: bool = True,
+        window: float | None = None,
     ) -> DeviceEstimate:
         """The estimate after one more page.
 
@@ -93,19 +100,54 @@ class DeviceEstimate:
             at several tones tell nothing here.
         measured : how the actuators moved.
         phases : whether phases were measured; where they were not, the last pages are fitted together.
+        window : for how long it was measured, in tau, where the page has not settled.
         """
-        seen = self._seen(measured)
         chains, pages = list(self.chains), list(self.pages)
-        for number, (state, phasor) in enumerate(zip(states, seen, strict=True)):
-            if not state.epsilon or state.tones:
-                continue
-            page = ChainPage(abs(state.epsilon), state.lam, state.omega, phasor * np.exp(-1j * np.angle(state.epsilon)))
+        for number, page in self._pages_seen(states, measured, window):
             if phases:
                 chains[number] = chains[number].after(page, noise)
             else:
                 pages[number] = (*pages[number], page)[-PAGES_KEPT:]
                 chains[number] = fit_amplitudes(self.prior[number], pages[number], noise)
         return replace(self, chains=tuple(chains), pages=tuple(pages))
+
+    def followed(
+        self,
+        states: Sequence[OperatingPoint],
+        measured: Measured,
+        noise: SensorNoise,
+        *,
+        phases: bool = True,
+        window: float | None = None,
+    ) -> tuple[DeviceEstimate, int]:
+        """The estimate after one more page of a device that changes while it is used; arguments as of `after`.
+
+        What was known before fades a little with every page of its chain. A chain that moves as nobody could expect is
+        learned anew from where it is; how many did is given too.
+        """
+        chains, pages, anew = list(self.chains), list(self.pages), 0
+        for number, page in self._pages_seen(states, measured, window):
+            prior = self.prior[number]
+            if phases:
+                chains[number] = chains[number].faded(prior, FADED)
+                if chains[number].surprise(page, noise) > SURPRISE:
+                    chains[number], pages[number], anew = chains[number].faded(prior, 1.0), (), anew + 1
+        faded = replace(self, chains=tuple(chains), pages=tuple(pages))
+        return faded.after(states, measured, noise, phases=phases, window=window), anew
+
+    def _pages_seen(
+        self, states: Sequence[OperatingPoint], measured: Measured, window: float | None
+    ) -> Iterator[tuple[int, ChainPage]]:
+        """The pages of the chains that were driven at one tone, by their numbers."""
+        n = self.device.chain_length
+        for number, (state, phasor) in enumerate(zip(states, self._seen(measured), strict=True)):
+            if state.epsilon and not state.tones:
+                turn = np.exp(-1j * np.angle(state.epsilon))
+                page = ChainPage(abs(state.epsilon), state.lam, state.omega, phasor * turn)
+                if window is not None and measured.change is not None and measured.rest is not None:
+                    place = slice(number * n, number * n + n)
+                    page = page._replace(rate=measured.change[place] * turn / window, rest=measured.rest[place])
+                yield number, page
 
     def _seen(self, measured: Measured) -> NDArray[np.complex128]:
         count = self.device.rows * self.device.cols
@@ -117,15 +159,7 @@ class DeviceEstimate:
     @property
     def mean(self) -> Floats:
         """The numbers of all actuators, row by row, float64, shape (actuators, 4), within what can be believed."""
-        mean, before, wide = (
-            np.concatenate([getattr(one, name) for one in chains])
-            for chains, name in ((self.chains, "mean"), (self.prior, "mean"), (self.prior, "deviation"))
-        )
-        # No stiffness, damping or gain changes its sign.
-        low = np.where(
-            np.array(NUMBERS) == "beta", before - FARTHEST * wide, np.maximum(before - FARTHEST * wide, 0.1 * before)
-        )
-        return np.asarray(np.clip(mean, low, before + FARTHEST * wide))
+        return np.concatenate([one.believed(prior) for one, prior in zip(self.chains, self.prior, strict=True)])
 
     @property
     def deviation(self) -> Floats:

@@ -24,11 +24,16 @@ class Measured:
     mean : float64, shape (actuators,), row by row, dimensionless (`Device.full_scale` is what is felt as 1).
     harmonic : complex128, shape (actuators,), dimensionless; NaN where nothing was measured, as in rows that are
         held still. Of amplitudes alone the phase says nothing.
+    change : complex128, shape (actuators,), by how much the harmonic changed while it was measured, as what rings on
+        from before makes it; None where that was not measured.
+    rest : float64, shape (actuators,), mean square of what moved besides; None as of `change`.
     """
 
     frame: int
     mean: NDArray[np.float64]
     harmonic: NDArray[np.complex128]
+    change: NDArray[np.complex128] | None = None
+    rest: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if self.mean.ndim != 1 or self.mean.shape != self.harmonic.shape:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,10 @@ EACH = len(NUMBERS)
 # Noise that is left to the balance of one harmonic even where nothing is measured wrongly, relative: it leaves out
 # about (beta a^2)^2/40.
 LEAST_NOISE = 1e-5
+# Of what moves besides a harmonic so much is seen in it, and in what the cubic term makes of it.
+LEAK = 0.03
+# A number may leave what was known by so many standard deviations: what lies farther off is no actuator of the device.
+FARTHEST = 10.0
 
 
 class SensorNoise(NamedTuple):
@@ -49,12 +53,43 @@ class ChainPage(NamedTuple):
     lam : float64, shape (n-1,), what the links were set to.
     omega : drive frequency over f0.
     phasor : complex128, shape (n,), dimensionless, phases against the drive; NaN where nothing was measured.
+    rate : complex128, shape (n,), by how much each phasor changes in tau; None where the page has settled.
+    rest : float64, shape (n,), mean square of what moves besides, dimensionless; None as of `rate`.
     """
 
     epsilon: float
     lam: Floats
     omega: float
     phasor: Complexes
+    rate: Complexes | None = None
+    rest: Floats | None = None
+
+    def noise(self, sensor: SensorNoise) -> Floats:
+        """Standard deviation of each phasor, relative to it; float64, shape (n,)."""
+        whole = sensor.of(self.phasor)
+        if self.rest is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                whole = np.hypot(whole, LEAK * np.sqrt(self.rest) / np.abs(self.phasor))
+        return np.asarray(whole)
+
+    @property
+    def growth(self) -> Complexes:
+        """Rate of each phasor over itself, complex128, shape (n,)."""
+        if self.rate is None:
+            return np.zeros_like(self.phasor)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.rate / self.phasor)
+
+    @property
+    def square(self) -> Floats:
+        """What beta makes a stage stiffer by; what moves at other frequencies counts twice. float64, shape (n,)."""
+        own = 0.75 * np.abs(self.phasor) ** 2
+        return own if self.rest is None else own + 3 * self.rest
+
+    @property
+    def wanted(self) -> Complexes:
+        """What `terms` times the numbers of a stage are; complex128, shape (n,)."""
+        return np.asarray(self.omega**2 - 2j * self.omega * self.growth)
 
     @property
     def terms(self) -> Complexes:
@@ -63,7 +98,7 @@ class ChainPage(NamedTuple):
             links = self.lam * (self.phasor[:-1] / self.phasor[1:] - 1)
             pull = np.concatenate([[self.epsilon / self.phasor[0]], links])
         one = np.ones(len(pull))
-        return np.stack([one, 1j * self.omega * one, 0.75 * np.abs(self.phasor) ** 2, -pull], axis=1)
+        return np.stack([one, 1j * self.omega + self.growth, self.square, -pull], axis=1)
 
     @property
     def force(self) -> Complexes:
@@ -76,9 +111,10 @@ class ChainPage(NamedTuple):
 class ChainEstimate:
     """The numbers of n actuators as far as they are known; normal.
 
-    Every stage balances by itself: ``k + i omega delta + (3/4) |A|^2 beta - gain pull = omega^2`` with
-    ``pull = lam (A_before/A - 1)``, of the first ``epsilon/A``. That is linear in the four numbers, so each page is one
-    step of Kalman's filter (Kalman, J. Basic Eng. 82, 1960), and needs no guess to start from.
+    Every stage balances by itself: ``k + (i omega + g) delta + (3/4) |A|^2 beta - gain pull = omega^2 - 2 i omega g``
+    with ``pull = lam (A_before/A - 1)``, of the first ``epsilon/A``, and ``g = A'/A`` while it still changes. That is
+    linear in the four numbers, so each page is one step of Kalman's filter (Kalman, J. Basic Eng. 82, 1960), and needs
+    no guess to start from.
 
     Attributes
     ----------
@@ -108,21 +144,45 @@ class ChainEstimate:
 
         Actuators that did not move, or were not measured, or follow one that was not, stay as they are.
         """
-        rates = self._rates(page)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            off = (page.omega**2 - np.einsum("mk,mk->m", page.terms, self.mean)) / (self.mean[:, 3] * page.force)
-        known = np.isfinite(off) & np.isfinite(rates).all(axis=1)
-        if not known.any():
+        rows, off = self._balances(page, noise)
+        if not len(rows):
             return self
-        rates, off = (whitened(part, known, noise.of(page.phasor)) for part in (rates, off[:, None]))
-        rows = np.concatenate([rates.real, rates.imag])
         spread = self.covariance @ rows.T
         gain = np.linalg.solve(rows @ spread + np.eye(len(rows)), spread.T).T
         # Joseph's form: it stays symmetric and positive.
         kept = np.eye(self.mean.size) - gain @ rows
-        step = gain @ np.concatenate([off.real, off.imag])[:, 0]
         covariance = kept @ self.covariance @ kept.T + gain @ gain.T
-        return ChainEstimate(self.mean + step.reshape(self.mean.shape), covariance)
+        return ChainEstimate(self.mean + (gain @ off).reshape(self.mean.shape), covariance)
+
+    def surprise(self, page: ChainPage, noise: SensorNoise) -> float:
+        """How far a page is from what was expected: mean square, in its own deviations; about 1 where all is known."""
+        rows, off = self._balances(page, noise)
+        if not len(rows):
+            return 0.0
+        return float(off @ np.linalg.solve(rows @ self.covariance @ rows.T + np.eye(len(rows)), off)) / len(rows)
+
+    def faded(self, prior: ChainEstimate, share: float) -> ChainEstimate:
+        """As much surer than `prior` as is left when a share of it has faded; the numbers stay."""
+        return replace(self, covariance=(1 - share) * self.covariance + share * prior.covariance)
+
+    def believed(self, prior: ChainEstimate) -> Floats:
+        """The numbers within what can be believed given what was known before any page; float64, shape (n, 4)."""
+        before, wide = prior.mean, prior.deviation
+        low = before - FARTHEST * wide
+        # No stiffness, damping or gain changes its sign.
+        low = np.where(np.array(NUMBERS) == "beta", low, np.maximum(low, 0.1 * before))
+        return np.asarray(np.clip(self.mean, low, before + FARTHEST * wide))
+
+    def _balances(self, page: ChainPage, noise: SensorNoise) -> tuple[Floats, Floats]:
+        """What the numbers do to the balances that are known, and what these lack, each with a noise of 1."""
+        rates = self._rates(page)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = (page.wanted - np.einsum("mk,mk->m", page.terms, self.mean)) / (self.mean[:, 3] * page.force)
+        known = np.isfinite(off) & np.isfinite(rates).all(axis=1)
+        if not known.any():
+            return np.empty((0, self.mean.size)), np.empty(0)
+        rates, off = (whitened(part, known, page.noise(noise)) for part in (rates, off[:, None]))
+        return np.concatenate([rates.real, rates.imag]), np.concatenate([off.real, off.imag])[:, 0]
 
     def _rates(self, page: ChainPage) -> Complexes:
         """What the numbers of each stage do to its phasor over that before it, relative; complex128, shape (n, 4n).

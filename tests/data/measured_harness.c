@@ -51,7 +51,8 @@ int main(void)
             double phase = (double)(dw_turns(&ask, i / cols) * (ask.at + k)) * 6.283185307179586 / 18446744073709551616.0;
             uint32_t bits = get();
             dw_put32(bytes, bits);
-            dw_sense(&windows[i], dw_f32(bytes), (float)cos(phase), (float)sin(phase));
+            double place = 6.283185307179586 * (k + 0.5) / ask.samples;
+            dw_sense(&windows[i], dw_f32(bytes), (float)cos(phase), (float)sin(phase), (float)cos(place), (float)sin(place));
         }
     dw_begin_measured(payload, 7, ask.frame, 0);
     for (uint32_t i = 0; i < count; i++) dw_put_measured(payload, i, dw_fit(&windows[i], dw_turns(&ask, i / cols) != 0));

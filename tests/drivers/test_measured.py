@@ -38,14 +38,20 @@ FRAME = 800  # samples; the window is the second half
 
 def measured(frame: int, count: int, seed: int = 1) -> Measured:
     rng = np.random.default_rng((seed, frame))
-    numbers = rng.normal(size=(3, count)).astype(np.float32).astype(np.float64)
-    return Measured(frame, numbers[0], numbers[1] + 1j * numbers[2])
+    numbers = rng.normal(size=(6, count)).astype(np.float32).astype(np.float64)
+    return Measured(frame, numbers[0], numbers[1] + 1j * numbers[2], numbers[3] + 1j * numbers[4], numbers[5])
 
 
 def same(one: Measured, other: Measured) -> None:
     assert one.frame == other.frame
     np.testing.assert_array_equal(one.mean, other.mean)
     np.testing.assert_array_equal(one.harmonic, other.harmonic)
+    assert one.change is not None
+    assert other.change is not None
+    assert one.rest is not None
+    assert other.rest is not None
+    np.testing.assert_array_equal(one.change, other.change)
+    np.testing.assert_array_equal(one.rest, other.rest)
 
 
 class Swinging:
@@ -117,18 +123,18 @@ def test_a_frame_comes_back_from_its_packets(frame: int, count: int, max_payload
 
 
 def test_parts_that_do_not_belong_are_passed_over() -> None:
-    frames = MeasuredFrames(9, 400)
-    first, last = parts_of(measured(3, 400), 9)
+    frames = MeasuredFrames(9, 300)
+    first, last = parts_of(measured(3, 300), 9)
     assert frames.take(first) is None
     for strange in (
-        replace(last, session=8), replace(last, first=399), replace(last, frame=2), *parts_of(measured(3, 700), 9)[1:],
+        replace(last, session=8), replace(last, first=299), replace(last, frame=2), *parts_of(measured(3, 500), 9)[1:],
     ):  # fmt: skip
         assert frames.take(strange) is None
     # A frame whose rest is lost gives way to the next one; what comes of it later is old.
-    newer = [frames.take(part) for part in parts_of(measured(4, 400), 9)]
+    newer = [frames.take(part) for part in parts_of(measured(4, 300), 9)]
     assert newer[0] is None
     assert newer[1] is not None
-    same(newer[1], measured(4, 400))
+    same(newer[1], measured(4, 300))
     assert frames.take(last) is None
 
 
@@ -206,6 +212,29 @@ def test_a_window_that_is_held_in_the_middle_gives_nothing() -> None:
         played += count if live else 0
     assert [one.frame for one in meter.finished()] == [1, 2]
     assert meter.finished() == []
+
+
+def test_what_still_rings_is_told_apart() -> None:
+    """A second oscillation that fades is hardly seen in the harmonic; how the first one grows is."""
+    tau, samples = 2 * np.pi * 133.13 / 8000, 3000
+
+    class Ringing(Swinging):
+        def sense(self, block: OutputBlock) -> np.ndarray:
+            x = np.arange(len(block.volts)) / len(block.volts)
+            at = tau * np.arange(len(block.volts))
+            z = (1 + 0.2 * x) * np.cos(1.35 * at) + 0.5 * np.exp(-x) * np.cos(1.1 * at)
+            return np.broadcast_to(z[:, None, None], (len(z), SPEC.rows, SPEC.cols))
+
+    meter = Meter(SPEC.rows, SPEC.cols, Ringing())
+    meter.ask(Measure(0, samples, 0, (turns_of(1.35, tau),)))
+    meter.take(OutputBlock(0.0, np.zeros((samples, 2)), np.zeros((samples, 2, 3)), 0, True))
+    (found,) = meter.finished()
+    assert found.change is not None
+    assert found.rest is not None
+    np.testing.assert_allclose(found.harmonic, 1.1, atol=1e-3)
+    np.testing.assert_allclose(found.change, 0.2, atol=2e-2)
+    # The second one's mean square, about half of its amplitude squared in the middle of the window.
+    np.testing.assert_allclose(found.rest, 0.5 * (0.5 * np.exp(-0.5)) ** 2, rtol=0.1)
 
 
 def test_a_window_too_short_has_a_mean_only() -> None:
@@ -291,6 +320,12 @@ def test_the_header_measures_as_python_does(tmp_path: Path) -> None:
     assert found is not None
     np.testing.assert_allclose(found.mean, here.mean, atol=1e-6)
     np.testing.assert_allclose(found.harmonic, here.harmonic, atol=1e-6)
+    assert found.change is not None
+    assert here.change is not None
+    assert found.rest is not None
+    assert here.rest is not None
+    np.testing.assert_allclose(found.change, here.change, atol=1e-5)
+    np.testing.assert_allclose(found.rest, here.rest, atol=1e-5)
     assert np.isnan(found.harmonic[cols:]).all()
 
 
