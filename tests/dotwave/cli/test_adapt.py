@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -199,10 +199,10 @@ def test_marks_measures_and_links_are_those_of_the_file(tmp_path: Path, device: 
     assert any(isinstance(event, LinkCoupling) for event in plain)
 
 
-def told(sent: Iterator[Message]) -> tuple[list[Event], list[object]]:
+def told(sent: Iterator[Message]) -> tuple[list[Event], list[dict[str, Any]]]:
     """The events of a session, by sample and kind, and what the notes of its marks say."""
     events = sorted(
-        (one for one in sent if not isinstance(one, SamplesMessage) and hasattr(one, "at")),
+        (one for one in sent if isinstance(one, Event)),
         key=lambda event: (event.at, type(event).__name__),
     )
     notes = [_unpacked(event.note) for event in events if isinstance(event, Mark)]
