@@ -201,12 +201,11 @@ def test_marks_measures_and_links_are_those_of_the_file(tmp_path: Path, device: 
 
 def told(sent: Iterator[Message]) -> tuple[list[Event], list[dict[str, Any]]]:
     """The events of a session, by sample and kind, and what the notes of its marks say."""
-    events = sorted(
-        (one for one in sent if isinstance(one, Event)),
-        key=lambda event: (event.at, type(event).__name__),
-    )
+    found = (one for one in sent if isinstance(one, Event))
+    events: list[Event] = sorted(found, key=lambda event: (event.at, type(event).__name__))
     notes = [_unpacked(event.note) for event in events if isinstance(event, Mark)]
-    return [replace(event, note=b"") if isinstance(event, Mark) else event for event in events], notes
+    bare: list[Event] = [replace(event, note=b"") if isinstance(event, Mark) else event for event in events]
+    return bare, notes
 
 
 @pytest.mark.parametrize(("version", "most_s"), [(VERSION, 0.5), (3, 2.0)])
