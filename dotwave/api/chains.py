@@ -92,8 +92,10 @@ def sweep(
         Also ask what chains reach that are drawn with what surrounds this device: `yield`, the share with the same
         outcome, `worst`, the actuator that is farthest off (from 0, -1 where none is known), `deviation`, the median of
         how far over the largest amplitude, and `spoiler`, the effect that alone spoils most. Takes seconds a setting.
-    devices, seed : int
-        How many are drawn, and from what.
+    devices : int
+        How many are drawn.
+    seed : int
+        From what they are drawn.
     **fixed
         `preload`, `bias`, `phase` and, of a grid, `lam_y`, as `Setting.of` takes them.
 

@@ -53,7 +53,7 @@ def image(
     --------
     >>> import dotwave as dw
     >>> dw.image("samples/icons/heart.svg").parts
-    ('icon: heart.svg, similarity 0.88',)
+    ('icon: heart.svg, similarity 0.98',)
     """
     profile = _device(device)
     chosen = pitched(replace(options or PictureOptions(), **changes), profile)

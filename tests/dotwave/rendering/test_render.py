@@ -127,16 +127,16 @@ def test_an_independent_integrator_feels_the_same(tmp_path):
     events = [e for e in manifest["coupling"] if e["row"] == row and e["t_s"] < frame["end_s"]]
     assert len(events) == 1, "a rise holds its links"
     lam = np.array(events[-1]["lam"])
-    tau_per_s = 2 * np.pi * device["f0_hz"]
+    tau_per_s, n = 2 * np.pi * device["f0_hz"], device["cols"]
 
     def motion(tau, state):
-        z, v = np.split(state, 2)
-        pull = -device["delta"] * v - z - device["beta"] * z**3
-        pull[0] += np.interp(tau / tau_per_s * rate, np.arange(len(force)), force)
-        pull[1:] += lam * (z[:-1] - z[1:])
-        return np.concatenate([v, pull])
+        z, v = state[:n], state[n:]
+        change = np.concatenate([v, -device["delta"] * v - z - device["beta"] * z * z * z])
+        place, part = divmod(tau / tau_per_s * rate, 1)
+        change[n] += (1 - part) * force[int(place)] + part * force[int(place) + 1]
+        change[n + 1 :] += lam * (z[:-1] - z[1:])
+        return change
 
-    n = device["cols"]
     at = np.arange(round(frame["settled_s"] * rate), round(frame["end_s"] * rate)) / rate * tau_per_s
     answer = solve_ivp(motion, (0, at[-1]), np.zeros(2 * n), "DOP853", at, rtol=1e-8, atol=1e-11, max_step=0.1)
     phase = frame["omega"][row] * at
