@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
@@ -39,7 +40,17 @@ def ended(command: Callable[[], object]) -> int:
         line = LONG_WORD.sub(r"\1...\2", printable(" ".join(end.line.split())))
         with suppress(OSError):
             typer.echo(f"dotwave: {line}", err=True)
+    _give_up_output()
     return end.code
+
+
+def _give_up_output() -> None:
+    """What could not be written is thrown away: when Python tries it once more at its end, it would say 120."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _ran(command: Callable[[], object]) -> _End:

@@ -87,11 +87,11 @@ def _first_of_tar(archive: tarfile.TarFile, entry: tarfile.TarInfo, most: int) -
 class _Entry(tarfile.TarInfo):
     """A header of bounded length: a small archive may unpack to one of many gigabytes."""
 
-    @classmethod
-    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _Entry:
-        entry = super().frombuf(buf, encoding, errors)
-        if entry.type in HEADERS and entry.size > LONGEST_HEADER:
-            raise tarfile.TarError(f"a header of {entry.size} bytes; at most {LONGEST_HEADER} are read")
+    def _proc_member(self, archive: tarfile.TarFile) -> tarfile.TarInfo:
+        # What tarfile leaves to be overridden; every header comes through here, which not every version's `frombuf` sees.
+        if self.type in HEADERS and self.size > LONGEST_HEADER:
+            raise tarfile.TarError(f"a header of {self.size} bytes; at most {LONGEST_HEADER} are read")
+        entry: tarfile.TarInfo = super()._proc_member(archive)  # type: ignore[misc]
         return entry
 
 

@@ -267,7 +267,7 @@ def test_the_command_line(dotwave: Callable[..., Any], tmp_path: Path, linked: P
     for option in ("--devices", "--seed", "--scheduler"):
         ended = dotwave("verify", wave, option, "7")
         assert (ended.code, ended.out) == (2, "")
-        assert ended.err.strip().endswith(f"{option} belongs to --as-built; add that, or leave it out")
+        assert ended.err.strip().endswith(f"{option} belongs to --as-built; give that too, or leave it out")
 
 
 def test_numbers_that_cannot_be_are_refused(linked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
