@@ -88,7 +88,7 @@ class _Entry(tarfile.TarInfo):
     """A header of bounded length: a small archive may unpack to one of many gigabytes."""
 
     def _proc_member(self, archive: tarfile.TarFile) -> tarfile.TarInfo:
-        # What tarfile leaves to be overridden; every header comes through here, which not every version's `frombuf` sees.
+        # What tarfile leaves to be overridden: every header comes here, and past `frombuf` in some versions.
         if self.type in HEADERS and self.size > LONGEST_HEADER:
             raise tarfile.TarError(f"a header of {self.size} bytes; at most {LONGEST_HEADER} are read")
         entry: tarfile.TarInfo = super()._proc_member(archive)  # type: ignore[misc]

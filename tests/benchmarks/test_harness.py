@@ -188,6 +188,7 @@ def test_variations_are_the_derivatives_of_the_end_by_the_start(shooting):
         np.testing.assert_allclose(found[:, :, k], (ends[0] - ends[1]) / 2e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_shooting_finds_what_a_long_wait_finds(shooting, monkeypatch):
     monkeypatch.setattr(shooting, "TOLERANCES", (1e-6,))
     wanted = module("ours").states_after(shooting.CHAINS, 64, 5000)

@@ -112,7 +112,7 @@ def run(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def runnable() -> list[Path]:
-    return [README, *(DOCS / f"{name}.md" for name in ("tutorial", "apps", "devices", "playing"))]
+    return [README, *(DOCS / f"{name}.md" for name in ("tutorial", "playing", "devices", "apps"))]
 
 
 @pytest.mark.parametrize("page", one_in(2, runnable()), ids=lambda page: page.name)

@@ -19,6 +19,7 @@ import pytest
 
 from drivers import read_waveform
 from drivers.files.parts import part_of
+from tests.support.everyday import one_in
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs kill")
 
@@ -219,7 +220,7 @@ class Harness:
         self.seen |= Counter({"kills": kills, "rounds": rounds})
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", one_in(2, CASES))
 def test_killed_a_few_times(tmp_path: Path, name: str) -> None:
     harness = Harness(CASES[name], tmp_path, seed=1)
     harness.kill(2)
