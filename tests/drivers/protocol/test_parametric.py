@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import re
 import subprocess
@@ -178,7 +179,16 @@ def play(port: str, path: Path, seconds: float) -> dict[str, object]:
     return report
 
 
+@pytest.fixture
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """An emulator takes a core for itself: two at a time leave none to who talks to them."""
+    with (tmp_path_factory.getbasetemp().parent / "emulator").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("alone")
 @pytest.mark.parametrize("device", GRIDS)
 def test_an_emulated_cortex_m_plays_hello_world(device: str, hello: dict[str, Path], tmp_path: Path) -> None:
     need("qemu-system-arm")
@@ -192,8 +202,10 @@ def test_an_emulated_cortex_m_plays_hello_world(device: str, hello: dict[str, Pa
         assert emulator.stdout is not None
         found = re.search(r"/dev/pts/\d+", emulator.stdout.readline())
         assert found is not None
-        report = play(found[0], hello[device], 900.0)
-        emulator.terminate()
+        try:
+            report = play(found[0], hello[device], 900.0)
+        finally:
+            emulator.terminate()
     assert report["ok"]
     write_vectors(record, read_waveform(hello[device])[0], tmp_path / "played.wav")
     felt = dw.verify(tmp_path / "played.wav")
@@ -209,12 +221,14 @@ def test_the_program_on_a_terminal_plays_hello_world(drawn: bool, hello: dict[st
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as controller:
         assert controller.stdout is not None
         port = controller.stdout.readline().strip()
-        if drawn:
-            assert play(port, hello["paper-6x6"], 60.0)["ok"]
-        else:
-            done = [sys.executable, "-m", "dotwave", "play", str(hello["paper-6x6"]), "--port", port, "--live"]
-            subprocess.run(done, check=False, timeout=60, capture_output=True)
-        controller.terminate()
+        try:
+            if drawn:
+                assert play(port, hello["paper-6x6"], 60.0)["ok"]
+            else:
+                done = [sys.executable, "-m", "dotwave", "play", str(hello["paper-6x6"]), "--port", port, "--live"]
+                subprocess.run(done, check=False, timeout=60, capture_output=True)
+        finally:
+            controller.terminate()
     assert controller.returncode == 0
     assert write_vectors(record, read_waveform(hello["paper-6x6"])[0], tmp_path / "played.wav")
     assert dw.verify(tmp_path / "played.wav").ok
