@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["alone_in", "held"]
+__all__ = ["alone_in", "awaited", "held"]
 
 # What a system says of a lock that somebody else has; anything else means that it has no such locks here.
 TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
@@ -41,6 +41,14 @@ def held(number: int) -> bool | None:
     return True
 
 
+def awaited(number: int) -> bool | None:
+    """As `held`, after waiting a while for who has it."""
+    until = time.monotonic() + PATIENCE_S
+    while (found := held(number)) is False and time.monotonic() < until:
+        time.sleep(PAUSE_S)
+    return found
+
+
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
     """Hold the lock of a folder while the body runs, and wait for it a while.
@@ -51,9 +59,8 @@ def alone_in(folder: Path) -> Iterator[None]:
     with suppress(OSError):
         number = os.open(folder, os.O_RDONLY)
     try:
-        until = time.monotonic() + PATIENCE_S
-        while number is not None and held(number) is False and time.monotonic() < until:
-            time.sleep(PAUSE_S)
+        if number is not None:
+            awaited(number)
         yield
     finally:
         if number is not None:

@@ -21,7 +21,7 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import BinaryIO
 
-from .locks import alone_in, held
+from .locks import alone_in, awaited, held
 
 __all__ = ["Belongs", "PartFile", "finish", "is_at", "make", "part_of", "settle", "settle_alone", "sync_folder"]
 
@@ -66,8 +66,9 @@ def make(part: PartFile) -> BinaryIO:
     """Make the file of a part, with the permissions any new file gets, open for writing and reading, and locked."""
     while True:
         file = os.fdopen(os.open(part.part, NEW, 0o666), "w+b")
-        # Between its making and its lock it looked like one of a dead writer.
-        if held(file.fileno()) is not False and is_at(part.part, file.fileno()):
+        # Between its making and its lock it looked like one of a dead writer. Who took it for that is waited for: a
+        # new one of that name would be deleted in place of the first.
+        if awaited(file.fileno()) is not False and is_at(part.part, file.fileno()):
             return file
         file.close()
         part.part.unlink(missing_ok=True)

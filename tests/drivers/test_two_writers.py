@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from drivers import atomic_files, settled
-from drivers.files.parts import part_of
+from drivers.files.parts import NEW, PartFile, is_at, make, part_of
 from tests.support.known import known
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks on folders")
@@ -94,6 +94,35 @@ def test_one_that_died_in_between_comes_before_who_ends_later(names_given: int, 
     settled(tmp_path / "x.json", NAMES.__contains__)
     assert words(tmp_path) == {b"of the living"}
     assert not [path for path in tmp_path.iterdir() if part_of(path)]
+
+
+def test_a_part_taken_for_that_of_a_dead_writer_is_not_deleted_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another writer locks a part before its own writer does, and deletes it when that has gone on."""
+    import fcntl
+
+    part, opened = PartFile(tmp_path / "x.wav", "0" * 16), os.open
+    taken: list[int] = []
+
+    def open_and_take(path: Path, flags: int, *more: int) -> int:
+        number = opened(path, flags, *more)
+        if flags == NEW and not taken:
+            taken.append(opened(path, os.O_RDONLY))
+            fcntl.flock(taken[0], fcntl.LOCK_EX)
+        return number
+
+    def delete(_: float = 0.0) -> None:
+        part.part.unlink()
+        os.close(taken.pop())
+        taken.append(-1)
+
+    monkeypatch.setattr("drivers.files.parts.os.open", open_and_take)
+    monkeypatch.setattr("drivers.files.locks.time.sleep", delete)
+    with make(part) as file:
+        if taken != [-1]:
+            delete()
+        assert is_at(part.part, file.fileno())
 
 
 def test_a_folder_that_somebody_holds_is_written_to_all_the_same(

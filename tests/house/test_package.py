@@ -85,12 +85,12 @@ def test_the_wheel_is_complete(built: Path) -> None:
     (wheel,) = built.glob("dotwave-*.whl")
     with zipfile.ZipFile(wheel) as archive:
         inside = set(archive.namelist())
-    data = {".py", ".pyi", ".yaml", ".md", ".h", ".xz"}
+    data = {".py", ".pyi", ".yaml", ".md", ".h", ".c", ".ld", ".xz"}
     wanted = {
         str(path.relative_to(ROOT))
         for name in PACKAGES
         for path in (ROOT / name).rglob("*")
-        if path.suffix in data or path.name in {"py.typed", "LICENSE-UNICODE"}
+        if path.suffix in data or path.name in {"py.typed", "LICENSE-UNICODE", "Makefile"}
     }
     assert {name for name in inside if ".dist-info/" not in name} == wanted
     assert any(name.endswith("licenses/LICENSE-MIT") for name in inside)
