@@ -195,8 +195,8 @@ def test_all_adds_the_slow_tests_and_the_rest_goes_to_pytest(house: House) -> No
 
 def test_how_long_the_tests_take_is_said_before(house: House) -> None:
     usual, everything, some = (house.run("test", *arguments) for arguments in ([], ["--all"], ["tests/test_x.py"]))
-    assert "run: the tests take about 9 minutes on two cores; here they use " in usual.stderr
-    assert "run: the tests take about 35 minutes on two cores" in everything.stderr
+    assert "run: the tests take about 8 minutes on two cores; here they use " in usual.stderr
+    assert "run: the tests take about 40 minutes on two cores" in everything.stderr
     assert "minutes" not in some.stderr
     cores = re.search(r"here they use (\d+)$", usual.stderr, flags=re.MULTILINE)
     assert cores is not None
