@@ -103,6 +103,8 @@ from .protocol.playout import (
 from .protocol.pty_line import (
     PtyUnavailable as PtyUnavailable,
     make_link as make_link,
+    open_pty as open_pty,
+    remove_link as remove_link,
 )
 from .protocol.record import (
     ArrivalRecorder as ArrivalRecorder,

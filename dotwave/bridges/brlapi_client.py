@@ -150,13 +150,10 @@ class BrlapiClient:
         self._in_tty().write(content)
         return b""
 
-    def _ranges(self, accepted: bool) -> Callable[[bytes], bytes]:
-        def said(content: bytes) -> bytes:
-            self._in_tty()
-            self.ranges.say(accepted, content)
-            return packed(ACK)
-
-        return said
+    def _say(self, accepted: bool, content: bytes) -> bytes:
+        self._in_tty()
+        self.ranges.say(accepted, content)
+        return packed(ACK)
 
     def _in_tty(self) -> WrittenCells:
         if self.written is None:
@@ -180,8 +177,8 @@ _REQUESTS: dict[int, Callable[[BrlapiClient, bytes], bytes]] = {
     ord("t"): BrlapiClient._enter,
     ord("L"): BrlapiClient._leave,
     ord("F"): lambda client, content: b"",
-    ord("m"): lambda client, content: client._ranges(False)(content),
-    ord("u"): lambda client, content: client._ranges(True)(content),
+    ord("m"): lambda client, content: client._say(False, content),
+    ord("u"): lambda client, content: client._say(True, content),
     ord("Z"): lambda client, content: packed(ACK),
     _WRITE: BrlapiClient._write,
     ord("P") << 8 | ord("V"): lambda client, content: client._parameters.set(content),

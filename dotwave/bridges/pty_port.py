@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
-import sys
 from collections import deque
 from pathlib import Path
 
-from drivers import PtyUnavailable, make_link
+from drivers import make_link, open_pty, remove_link
 
 from .baum import BaumDisplay
 from .canute import CanuteDisplay
@@ -63,15 +62,8 @@ class PtyPort(WindowPort):
         PtyUnavailable, FileError
             When it, or the link, cannot be made.
         """
-        if sys.platform == "win32":
-            raise PtyUnavailable("Windows has no pseudo-terminals; use --from brlapi or lines")
-        try:
-            self._master, self._held = os.openpty()
-        except OSError as error:
-            raise PtyUnavailable(f"no pseudo-terminal: {error.strerror}") from None
-        os.set_blocking(self._master, False)
-        self._pty = self.name = os.ttyname(self._held)
-        self._hold(self._held)
+        self._master, self._held, self._pty = open_pty("use --from brlapi or lines")
+        self.name = self._pty
         if self._link is not None:
             make_link(self._link, self._pty)
             self.name = str(self._link)
@@ -96,8 +88,8 @@ class PtyPort(WindowPort):
         if self._master < 0:
             return
         asyncio.get_running_loop().remove_reader(self._master)
-        if self._link is not None and os.path.islink(self._link) and os.readlink(self._link) == self._pty:
-            self._link.unlink(missing_ok=True)
+        if self._link is not None:
+            remove_link(self._link, self._pty)
         for number in (self._master, self._held):
             if number >= 0:
                 os.close(number)

@@ -14,12 +14,13 @@ from typing import Any, TextIO
 
 from chainsim import Device, load_device
 from drivers import KeyEvent, atomic_file, naming
-from encoders import GridShape, TextOptions, resolve_tables
+from encoders import CellGrid, LayoutError, TextOptions, resolve_tables
 
 from ..errors import AppError
 from ..live.live import Live
 from ..live.state import LiveState
 from ..plain import printable
+from ..scenes import shape_of
 from .baum import MOST_CELLS, BaumDisplay
 from .brlapi import BrlapiServer
 from .brlapi_client import BrlapiDisplay
@@ -179,25 +180,25 @@ def replay(path: Path, device: str, options: LiveOptions, out: TextIO | None = N
 
 
 def fold_of(device: Device) -> GridFold:
-    """The cells of a grid: of four rows where its rows make such, else of three.
+    """The cells of a grid, as it shows them.
 
     Raises
     ------
     AppError
         When it has no room for one.
     """
-    height = 4 if device.rows % 4 == 0 else 3
-    lines, per_line = device.rows // height, device.cols // 2
-    if not lines * per_line:
-        raise AppError(f"{device.name}: {device.rows} x {device.cols} actuators have no room for a cell")
-    return GridFold(lines, per_line, 2 * height)
+    try:
+        grid = CellGrid(shape_of(device))
+    except LayoutError as error:
+        raise AppError(f"{device.name}: {error}") from None
+    return GridFold(grid.lines, grid.cells_per_line, grid.dots)
 
 
 def _port(profile: Device, fold: GridFold, source: WindowSource, options: LiveOptions) -> WindowPort:
     if source is WindowSource.LINES:
         text = TextOptions(dots=fold.dots) if options.table is None else TextOptions(options.table, dots=fold.dots)
         resolve_tables(text.table)
-        return StdinPort(LineSource(GridShape(profile.rows, profile.cols), text))
+        return StdinPort(LineSource(shape_of(profile), text))
     if source is WindowSource.BRLAPI:
         display = BrlapiDisplay(fold.columns, fold.rows, profile.name, _secret(options.secret))
         return BrlapiPort(BrlapiServer(display, glyphs(options.table or COMPUTER_TABLE)))

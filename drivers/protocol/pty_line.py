@@ -8,11 +8,12 @@ import re
 import select
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from ..errors import DriverError, FileError
 from ..files.whole import naming
 
-__all__ = ["PtyLine", "PtyUnavailable", "make_link"]
+__all__ = ["Pty", "PtyLine", "PtyUnavailable", "make_link", "open_pty", "remove_link"]
 
 MOST_PENDING = 1 << 20
 # Names of pseudo-terminals on Linux and the BSDs, and on macOS.
@@ -49,19 +50,9 @@ class PtyLine:
 
     def plug(self) -> None:
         """Make the pty (again)."""
-        if sys.platform == "win32":
-            raise PtyUnavailable("Windows has no pseudo-terminals; run the emulator under Linux, macOS or WSL")
-        import tty
-
-        try:
-            self._master, self._slave = os.openpty()
-        except OSError as error:
-            raise PtyUnavailable(f"no pseudo-terminal: {error.strerror}") from None
-        # Raw: bytes pass as they are, and none of them is a signal. This side keeps the slave open too, so that
-        # a host that goes away does not end the line.
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.name = self._pty = os.ttyname(self._slave)
+        # This side keeps the slave open too, so that a host that goes away does not end the line.
+        self._master, self._slave, self._pty = open_pty("run the emulator under Linux, macOS or WSL")
+        self.name = self._pty
         if self._link is not None:
             try:
                 make_link(self._link, self._pty)
@@ -72,9 +63,8 @@ class PtyLine:
 
     def unplug(self) -> None:
         """As if the cable were pulled: the host's next read or write fails."""
-        # While the pty is ours, a link to it is ours too.
-        if self._link is not None and self.plugged and _target(self._link) == self._pty:
-            self._link.unlink(missing_ok=True)
+        if self._link is not None and self.plugged:
+            remove_link(self._link, self._pty)
         self._hang_up()
 
     @property
@@ -125,6 +115,39 @@ class PtyLine:
         return bytes(data)
 
 
+class Pty(NamedTuple):
+    """Both ends of a pseudo-terminal, and the name by which the second is opened."""
+
+    master: int
+    slave: int
+    name: str
+
+
+def open_pty(cure: str) -> Pty:
+    """A pseudo-terminal that passes bytes as they are, none of them a signal; its master does not block.
+
+    Parameters
+    ----------
+    cure : what to do on Windows, which has none.
+
+    Raises
+    ------
+    PtyUnavailable
+        When there is none to be had.
+    """
+    if sys.platform == "win32":
+        raise PtyUnavailable(f"Windows has no pseudo-terminals; {cure}")
+    import tty
+
+    try:
+        master, slave = os.openpty()
+    except OSError as error:
+        raise PtyUnavailable(f"no pseudo-terminal: {error.strerror}") from None
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    return Pty(master, slave, os.ttyname(slave))
+
+
 def make_link(link: Path, pty: str) -> None:
     """Make `link` to `pty`, in the place of a link that an emulator left when it died, and of nothing else.
 
@@ -145,6 +168,12 @@ def make_link(link: Path, pty: str) -> None:
         except FileExistsError:
             there = "the port of a terminal in use" if ours else "not a port that dotwave made"
             raise FileError(f"{link}: this is {there}; move it away, or give --link another name") from None
+
+
+def remove_link(link: Path, pty: str) -> None:
+    """Take `link` away if it leads to `pty`: as long as the pty is ours, such a link is ours too."""
+    if _target(link) == pty:
+        link.unlink(missing_ok=True)
 
 
 def _target(link: Path) -> str | None:

@@ -15,8 +15,9 @@ from dotwave.bridges.line_source import LineSource
 from dotwave.bridges.mirror import LiveMirror, dot_numbers
 from dotwave.bridges.run import fold_of
 from dotwave.bridges.window import BrailleWindow, Key, KeyName
+from dotwave.errors import AppError
 from drivers import FileError, GridKey, KeyEvent
-from encoders import GridShape
+from encoders import CellGrid, GridShape
 
 
 def shown(lines: LineSource) -> tuple[str, str]:
@@ -66,6 +67,18 @@ def test_six_cells_are_folded_and_wide_grids_are_not() -> None:
     assert [narrow.place(cell) for cell in range(6)] == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
     wide = fold_of(load_device("linked-40x96"))
     assert (wide.columns, wide.rows, wide.dots) == (48, 10, 8)
+
+
+@pytest.mark.parametrize("rows", [3, 4, 6, 8, 12, 24])
+def test_a_source_is_told_the_cells_that_the_grid_shows(rows: int) -> None:
+    fold = fold_of(load_device("linked-6x6").model_copy(update={"rows": rows}))
+    grid = CellGrid(GridShape(rows, 6))
+    assert (fold.lines, fold.per_line, fold.dots) == (grid.lines, grid.cells_per_line, grid.dots)
+
+
+def test_a_grid_without_room_for_a_cell_is_named() -> None:
+    with pytest.raises(AppError, match="linked-6x6: a grid of 2 x 6 actuators has no room for a cell"):
+        fold_of(load_device("linked-6x6").model_copy(update={"rows": 2}))
 
 
 def test_dots_seven_and_eight_are_left_out_where_there_are_none() -> None:
