@@ -39,6 +39,7 @@ from drivers.protocol.plant import Sensors, TruePlant, true_factors
 from drivers.protocol.playout import OutputBlock
 from encoders import GridShape, TextOptions, TextSource, encode_text
 from planner import Measured, Plan, plan_scene
+from tests.support.playing import exchange
 
 AS_PLANNED = PlantFile.model_validate({})
 SPREAD = {"frequency": 0.002, "damping": 0.05, "lam": 0.02, "force": 0.03}
@@ -65,15 +66,7 @@ class Played:
             lambda found: session_messages(manifest, reader, found, session=7),
             session=7, timing=Timing(), on_measured=self.found.append,
         )  # fmt: skip
-        session.connected()
-        now = 0.0
-        while not session.finished:
-            now += 0.005
-            assert now < 60.0
-            controller.receive(session.poll(now), now)
-            out = controller.outgoing()
-            self.said += out
-            session.receive(out, now)
+        exchange(session, controller, watch=self.said.extend)
         assert session.report.underruns == 0
 
 

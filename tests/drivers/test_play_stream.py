@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -29,6 +28,7 @@ from drivers.sinks.serial_play import NoAnswer, run_session
 from drivers.sinks.uart import PortUnavailable, Uart, serial_ports
 from encoders import Frame, TargetPattern
 from planner import FramePlan, Margins, OperatingPoint, Plan, Ramp
+from tests.support.playing import exchange, serving
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 
@@ -110,21 +110,8 @@ class SharedClock:
 def emulated(device: Device, clock: SharedClock, **options: object) -> Iterator[Emulator]:
     """An emulator that lives in a thread of its own."""
     spec = ControllerSpec.of(device, **SPEC)
-    emulator = Emulator(device, spec, clock=clock.emulator, **options)  # type: ignore[arg-type]
-    over = threading.Event()
-
-    def live() -> None:
-        while not over.is_set():
-            emulator.step(0.002)
-
-    thread = threading.Thread(target=live)
-    thread.start()
-    try:
+    with serving(Emulator(device, spec, clock=clock.emulator, **options)) as emulator:  # type: ignore[arg-type]
         yield emulator
-    finally:
-        over.set()
-        thread.join()
-        emulator.close()
 
 
 def play_to(port: str, path: Path, clock: SharedClock, *, patience_s: float = 10.0) -> StreamReport:
@@ -294,18 +281,13 @@ def test_links_that_change_leave_the_store_full(tmp_path: Path) -> None:
     from encoders import GridShape, TextOptions, TextSource, encode_text
     from planner import plan_scene
 
-    device, now = load_device("linked-6x6"), 0.0
+    device = load_device("linked-6x6")
     scene = encode_text(TextSource.of_text("Hello you"), GridShape(6, 6), TextOptions(dwell_s=0.5))
     write_waveform(plan_scene(scene, device), tmp_path / "sent.wav")
     manifest, reader = read_waveform(tmp_path / "sent.wav")
     make = partial(session_messages, manifest, reader, session=42)
     session = HostSession(make, session=42, timing=Timing())
-    controller = VirtualController(ControllerSpec.of(device, buffer_s=0.5), now=now)
-    session.connected()
-    while not session.finished:
-        now += 0.002
-        controller.receive(session.poll(now), now)
-        session.receive(controller.outgoing(), now)
+    exchange(session, VirtualController(ControllerSpec.of(device, buffer_s=0.5), now=0.0), step_s=0.002)
     assert session.report.underruns == 0
     # The clock starts with half of it.
     assert session.report.least_buffer_s > 0.2

@@ -42,6 +42,7 @@ from drivers.protocol.record import _unpacked
 from drivers.sinks.controller import LEAD_S
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import Adaptation, EstimateError, Measured, Plan, plan_scene
+from tests.support.playing import exchange
 
 if TYPE_CHECKING:
     from tests.conftest import Ended
@@ -95,13 +96,7 @@ class Played:
             else session_messages(self.manifest, reader, found, session=7),
             session=7, timing=Timing(lead_s=LEAD_S) if adapt else Timing(), on_measured=heard,
         )  # fmt: skip
-        session.connected()
-        now = 0.0
-        while not session.finished:
-            now += 0.005
-            assert now < 60.0
-            controller.receive(session.poll(now), now)
-            session.receive(controller.outgoing(), now)
+        exchange(session, controller)
         self.report: StreamReport = session.report
         assert self.report.underruns == 0
 
@@ -224,16 +219,13 @@ def test_a_large_buffer_is_not_filled(
         ),
         session=7, timing=Timing(lead_s=LEAD_S),
     )  # fmt: skip
-    session.connected()
-    now = most = 0.0
-    while not session.finished:
-        now += 0.005
-        assert now < 20.0
-        controller.receive(session.poll(now), now)
-        session.receive(controller.outgoing(), now)
-        most = max(most, (controller.playout.received - controller.playout.played) / rate)
+    ahead: list[float] = []
+    exchange(
+        session, controller, patience_s=20.0,
+        watch=lambda said: ahead.append((controller.playout.received - controller.playout.played) / rate),
+    )  # fmt: skip
     assert session.report.underruns == 0
-    assert most_s - 0.1 < most < most_s + 0.02
+    assert most_s - 0.1 < max(ahead) < most_s + 0.02
 
 
 def test_no_sample_passes_the_gate_that_is_over_it(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -25,6 +24,7 @@ from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import EstimateError, Measured, Plan, plan_scene
 from tests.support.hidden_device import HiddenDevice, HiddenGrid, drawn
 from tests.support.hidden_piezo import HiddenPiezo
+from tests.support.playing import serving
 
 if TYPE_CHECKING:
     from tests.conftest import Ended
@@ -114,20 +114,8 @@ def test_the_report_says_what_happened_and_what_is_not_known(tmp_path: Path) -> 
 def emulated(device: Device, plant: Path, link: Path) -> Iterator[None]:
     """A controller on actuators that are as `plant` says, until the block ends."""
     spec = ControllerSpec.of(device, buffer_s=10.0, watchdog_s=30.0)
-    emulator, over = Emulator(device, spec, link=link, plant=read_plant(plant, device)), threading.Event()
-
-    def serve() -> None:
-        while not over.is_set():
-            emulator.step(0.002)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
+    with serving(Emulator(device, spec, link=link, plant=read_plant(plant, device))):
         yield
-    finally:
-        over.set()
-        thread.join()
-        emulator.close()
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from chainsim import load_device
 from drivers import ControllerSpec, Emulator, KeyEvent, LoopLine, PortUnavailable, VirtualController
 from drivers.protocol.replies import State
 from encoders import LayoutError, TargetPattern
+from tests.support.playing import serving
 
 PATIENT_S = 120.0
 
@@ -38,20 +38,8 @@ def says(live: dw.Live, note: str) -> Callable[[], bool]:
 @contextmanager
 def emulated(record: Path | None = None) -> Iterator[Emulator]:
     device = load_device("paper-6x6")
-    emulator, over = Emulator(device, ControllerSpec.of(device), record=record), threading.Event()
-
-    def run() -> None:
-        while not over.is_set():
-            emulator.step(0.002)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
+    with serving(Emulator(device, ControllerSpec.of(device), record=record)) as emulator:
         yield emulator
-    finally:
-        over.set()
-        thread.join()
-        emulator.close()
 
 
 @needs_pty
