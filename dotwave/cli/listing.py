@@ -104,7 +104,7 @@ def list_translation_tables(wanted: str | None) -> TableListing:
 
 def _summary(device: Device) -> Iterator[str]:
     yield f"{device.name}: {device.description}".rstrip(": ")
-    chains = device.rows * device.chains_per_row
+    chains = device.chains
     yield f"  grid: {device.rows} x {device.cols} actuators, {1e3 * device.pitch_m:g} mm apart"
     coupling = device.coupling
     scope = _SCOPES[coupling.scope]

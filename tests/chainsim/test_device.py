@@ -28,7 +28,7 @@ def written(tmp_path, data):
 def test_built_in_profiles(name):
     device = load_device(name)
     assert device.name == name
-    assert device.cols % device.chain_length == 0
+    assert device.chains * device.chain_length == device.rows * device.cols
     assert device.beta == -1
     assert device.full_scale < device.escape_amplitude
     assert {"delta", "beta", "full_scale", "epsilon_per_volt"} <= {
