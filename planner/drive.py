@@ -174,7 +174,7 @@ class DriveTone:
 def tones_of(point: OperatingPoint, ramp: Ramp | None, place: int = 0) -> Iterator[DriveTone]:
     """The tones that sound on a ramp or at the point it leads to, each frequency once.
 
-    `place` : which driven actuator of a grid, as in `PointTone`.
+    `place` : of the actuator that is driven, as in `PointTone`.
     """
     held = {tone.omega: tone.epsilon for tone in point.every_tone if tone.place == place}
     way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
@@ -197,7 +197,7 @@ def samples(
     ----------
     tau : float64, shape (S,), S > 1, from the start of the ramp.
     start : of the ramp, tau from that of the whole plan.
-    place : which driven actuator of a grid, as in `PointTone`.
+    place : of the actuator that is driven, as in `PointTone`.
 
     Returns
     -------

@@ -47,7 +47,7 @@ class PointTone:
     ----------
     phasor : complex128, shape (n,), predicted amplitudes at omega, dimensionless.
     side : it is not itself wanted, but keeps those that are at their amplitudes.
-    place : which of the actuators that a grid drives it drives, in the order of `Device.driven`; of a chain the first.
+    place : which actuator of the chain it drives, from 0; only those of a grid drive others than the first.
     """
 
     omega: float

@@ -36,7 +36,7 @@ class ToneRamp:
     ----------
     omega : its frequency over f0.
     epsilon, epsilon_slope : complex128, shape (K,), as in `Ramp`.
-    place : which driven actuator, as in `PointTone`.
+    place : of the actuator that it drives, as in `PointTone`.
     """
 
     omega: float

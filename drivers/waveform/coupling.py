@@ -143,15 +143,16 @@ class LamTrack:
     Parameters
     ----------
     events : by time within each row.
-    device : the hardware.
+    rows, cols : the grid.
+    down : whether it is coupled in two dimensions.
     """
 
-    def __init__(self, events: Iterable[CouplingEvent], device: Device) -> None:
-        of_row: list[list[CouplingEvent]] = [[] for _ in range(device.rows)]
+    def __init__(self, events: Iterable[CouplingEvent], rows: int, cols: int, *, down: bool = False) -> None:
+        of_row: list[list[CouplingEvent]] = [[] for _ in range(rows)]
         for event in events:
             of_row[event.row].append(event)
-        self._rows = [_RowTrack.of(row, device.cols - 1 + device.grid * device.cols) for row in of_row]
-        self._cols = device.cols
+        self._rows = [_RowTrack.of(row, 2 * cols - 1 if down else cols - 1) for row in of_row]
+        self._cols = cols
 
     def at(self, times_s: Floats) -> Floats:
         """Links at the given times.

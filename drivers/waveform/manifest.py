@@ -124,7 +124,7 @@ class Manifest:
 
     @cached_property
     def _lam(self) -> LamTrack:
-        return LamTrack(self.coupling, self.device)
+        return LamTrack(self.coupling, self.device.rows, self.device.cols, down=self.device.grid)
 
     def lam_at(self, times_s: Floats) -> Floats:
         """Links at a block of times (float64, shape (S,), seconds); memory is that of the answer.

@@ -159,12 +159,12 @@ def volts_of(device: Device, frame: FramePlan, index: NDArray[np.intp]) -> Float
     since_s = time_s - frame.start_s
     biases = device.rows * device.cols if device.bias == "actuator" else 0
     driven = len(device.driven)
-    places = driven // len(frame.states)
     out = np.zeros((driven + biases, len(index)))
     carriers: dict[float, _Carrier] = {}
     equal: dict[tuple[int, int, int], int] = {}
-    for number in range(driven):
-        chain, place = divmod(number, places)
+    for number, (row, col) in enumerate(device.driven):
+        # A grid is one chain with several drives; of all other chains the first actuator is driven.
+        chain, place = (0, row * device.cols + col) if device.grid else (number, 0)
         state, ramp = frame.states[chain], frame.ramps[chain]
         # Equal rows come from the planner's cache as the same objects: sampled once, then copied.
         first = equal.setdefault((id(state), id(ramp), place), number)

@@ -12,7 +12,7 @@ from ..margins import slew_of
 from ..operating_point import Margins, OperatingPoint, PointTone
 from ..plan import Ramp, ToneRamp
 
-__all__ = ["margins_of", "noise_of", "point_tones", "ramp_of", "rest_of"]
+__all__ = ["margins_of", "noise_of", "places_of", "point_tones", "ramp_of", "rest_of"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -31,22 +31,27 @@ def rest_of(device: Device, target: Floats) -> OperatingPoint:
     )  # fmt: skip
 
 
-def point_tones(omega: float, epsilon: Complexes, n: int) -> tuple[PointTone, ...]:
-    """The drives of all driven actuators behind the first, shape (places,), of a grid of n."""
-    silent = np.zeros(n, dtype=np.complex128)
-    return tuple(
-        PointTone(omega, complex(one), silent, side=True, place=place) for place, one in enumerate(epsilon) if place
-    )
+def point_tones(device: Device, omega: float, epsilon: Complexes) -> tuple[PointTone, ...]:
+    """The drives of all driven actuators behind the first that are not silent; `epsilon` is of shape (driven,)."""
+    silent = np.zeros(device.chain_length, dtype=np.complex128)
+    drives = list(zip(places_of(device), epsilon.tolist(), strict=True))[1:]
+    return tuple(PointTone(omega, one, silent, side=True, place=place) for place, one in drives if one)
 
 
-def ramp_of(omega: float, t_s: Floats, epsilon: Complexes, slope: Complexes) -> Ramp:
-    """A ramp of the drives of all driven actuators, complex128, shape (places, nodes); `slope` is per second."""
-    tones = tuple(ToneRamp(omega, epsilon[place], slope[place], place) for place in range(1, len(epsilon)))
+def places_of(device: Device) -> list[int]:
+    """The driven actuators, counted row by row."""
+    return [row * device.cols + col for row, col in device.driven]
+
+
+def ramp_of(device: Device, omega: float, t_s: Floats, epsilon: Complexes, slope: Complexes) -> Ramp:
+    """A ramp of the drives of all driven actuators, complex128, shape (driven, nodes); `slope` is per second."""
+    every = zip(places_of(device), epsilon, slope, strict=True)
+    tones = tuple(ToneRamp(omega, one, rise, place) for place, one, rise in every if place and one.any())
     return Ramp(t_s=t_s, epsilon=epsilon[0], epsilon_slope=slope[0], tones=tones)
 
 
 def margins_of(device: Device, epsilon: Complexes, phasor: Complexes, links: GridLinks, omega: float) -> Margins:
-    """How far a motion, complex128, shape (rows, cols), stays from its limits; `epsilon` of shape (places,)."""
+    """How far a motion, complex128, shape (rows, cols), stays from its limits; `epsilon` of shape (driven,)."""
     strongest, size = float(np.abs(epsilon).max()), np.abs(phasor)
     return Margins(
         volts=strongest / device.epsilon_max,

@@ -19,8 +19,8 @@ from ..closed_forms.grid import GridLinks
 from ..drive import cubic, cubic_slope, links_at
 from ..family import AmplitudeFamily, PatternFamily
 from ..operating_point import Margins, OperatingPoint
-from ..plan import Ramp, ToneRamp
-from .point import point_tones
+from ..plan import Ramp
+from .point import point_tones, ramp_of
 
 __all__ = ["GridRows", "row_device"]
 
@@ -79,12 +79,17 @@ class GridRows(AmplitudeFamily):
             phasor=np.concatenate([row.phasor for row in rows]),
             mean=np.zeros(self.device.chain_length),
             bias=np.zeros(self.device.chain_length),
-            tones=tuple(one for one in point_tones(rows[0].omega, epsilon, self.device.chain_length) if one.epsilon),
+            tones=point_tones(self.device, rows[0].omega, self._driven(epsilon)),
             error=max(row.error for row in rows),
             margins=_worst([row.margins for row in rows]),
             outcome=failed.outcome,
             lacking=failed.lacking,
         )
+
+    def _driven(self, of_rows: Complexes) -> Complexes:
+        """What the rows are driven with, shape (rows, ...), for all driven actuators: those of the first row rest."""
+        others = len(self.device.driven) - self.device.rows
+        return np.concatenate([of_rows, np.zeros((others, *of_rows.shape[1:]), dtype=np.complex128)])
 
     def _links(self, right: Floats) -> Floats:
         """With those downwards, which rest; float64, shape (..., links)."""
@@ -108,7 +113,7 @@ class GridRows(AmplitudeFamily):
         parts = (getattr(point, name).reshape(device.rows, n) for name in ("target", "phasor"))
         return [
             replace(
-                point, target=target, phasor=phasor, lam=right[row, 1:], epsilon=epsilon.get(row, 0j), tones=(),
+                point, target=target, phasor=phasor, lam=right[row, 1:], epsilon=epsilon.get(row * n, 0j), tones=(),
                 bias=np.zeros(n), mean=np.zeros(n),
             )
             for row, (target, phasor) in enumerate(zip(*parts, strict=True))
@@ -120,17 +125,18 @@ class GridRows(AmplitudeFamily):
             return None
         t_s = _union([way.t_s for way in moving])
         curves = [_drive(t_s, point, way) for point, way in zip(after, ways, strict=True)]
-        first, *others = (ToneRamp(after[0].omega, *curve, place=place) for place, curve in enumerate(curves))
+        epsilon, slope = (self._driven(np.array(part)) for part in zip(*curves, strict=True))
         lam_t_s = _union([way.lam_t_s for way in moving if way.lam_t_s is not None] or [t_s[[0, -1]]])
         # At the end of the way the course still counts: afterwards the state's links do.
         right = np.concatenate(
             [links_at(point, way, lam_t_s, before=True) for point, way in zip(after, ways, strict=True)], axis=1
         )
-        return Ramp(
-            t_s=t_s, epsilon=first.epsilon, epsilon_slope=first.epsilon_slope,
-            lam_t_s=lam_t_s, lam=self._links(right), tones=tuple(one for one in others if one.epsilon.any()),
+        return replace(
+            ramp_of(self.device, after[0].omega, t_s, epsilon, slope),
+            lam_t_s=lam_t_s,
+            lam=self._links(right),
             lacking=next((way.lacking for way in moving if way.lacking), ""),
-        )  # fmt: skip
+        )
 
 
 def _union(nodes: Sequence[Floats]) -> Floats:

@@ -74,7 +74,7 @@ class GridWaves(RisingFamily):
         return OperatingPoint(
             target=target.levels, epsilon=complex(epsilon[0]), lam=links.flat, omega=wave.omega, phasor=phasor.ravel(),
             bias=np.zeros(device.chain_length), mean=np.zeros(device.chain_length),
-            tones=point_tones(wave.omega, epsilon, device.chain_length), error=error, margins=margins,
+            tones=point_tones(device, wave.omega, epsilon), error=error, margins=margins,
             phase=target.phases if isinstance(target, WaveTarget) and wish.phased.any() else None,
             outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking,
         )  # fmt: skip

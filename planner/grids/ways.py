@@ -79,7 +79,7 @@ class _Way:
         force = self._drives(envelopes, across, along)
         epsilon, slope = (np.array([force[place][k] for place in device.driven], dtype=np.complex128) for k in (0, 1))
         t_s = np.linspace(0.0, duration / device.tau_per_s, NODES)
-        self.ramp = ramp_of(point.omega, t_s, epsilon, slope * device.tau_per_s)
+        self.ramp = ramp_of(device, point.omega, t_s, epsilon, slope * device.tau_per_s)
         self._strongest = float(np.abs(epsilon).max())
 
     @property
@@ -149,10 +149,10 @@ def _error_after(device: Device, point: OperatingPoint, ramp: Ramp) -> float:
 
     rate = device.amplifier.rate_hz
     count = int((ramp.duration_s + WATCHED_S) * rate)
-    tau: Floats = np.arange(count) * (device.tau_per_s / rate)
+    tau = np.asarray(np.arange(count) * (device.tau_per_s / rate), dtype=np.float64)
     force = np.zeros((count, device.rows, device.cols))
-    for place, at in enumerate(device.driven):
-        force[:, at[0], at[1]] = samples(device, point, ramp, tau, place=place)
+    for row, col in device.driven:
+        force[:, row, col] = samples(device, point, ramp, tau, place=row * device.cols + col)
     links = GridLinks.of(device, point.lam)
     z = AsBuilt(device).integrator(rate).advance(force, links.right, links.down).reshape(count, -1)
     worst = 0.0

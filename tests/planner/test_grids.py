@@ -38,14 +38,14 @@ def test_the_closed_form_solves_the_stage(seed: int) -> None:
     asked = lam_x * (np.exp(1j * lag_x) - 1) + lam_y * (np.exp(1j * lag_y) - 1)
     assert asked == pytest.approx(kappa + 1j * WAVES.delta * omega, abs=1e-12)
     row, col = np.ogrid[:6, :6]
-    wave = amplitude * np.exp(-1j * (lag_x * col + lag_y * row))
+    wave = np.asarray(amplitude * np.exp(-1j * (lag_x * col + lag_y * row)), dtype=np.complex128)
     needed = grid.drives_of(WAVES, wave, grid.GridLinks.alike(WAVES, lam_x, lam_y), omega)
     assert np.abs(needed[1:, 1:]).max() < 1e-12 < np.abs(needed[0]).min()
 
 
 def test_what_drives_ask_for_is_what_they_make() -> None:
     rng = np.random.default_rng(1)
-    wanted = 0.02 * (rng.normal(size=(6, 6)) + 1j * rng.normal(size=(6, 6)))
+    wanted = np.asarray(0.02 * (rng.normal(size=(6, 6)) + 1j * rng.normal(size=(6, 6))), dtype=np.complex128)
     links = grid.GridLinks.of(WAVES, rng.uniform(0, 0.3, WAVES.links))
     drive = grid.drives_of(WAVES, wanted, links, 1.3)
     assert grid.motion_under(WAVES, drive, links, 1.3) == pytest.approx(wanted, abs=1e-12)
