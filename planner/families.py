@@ -49,6 +49,11 @@ def _linked_rows(device: Device) -> bool:
     return device.grid and device.coupling.scope == "link" and device.coupling.drives != "corner"
 
 
+def _linked_corner(device: Device) -> bool:
+    """Whether they are, with a lam per link and one drive for them all."""
+    return device.grid and device.coupling.scope == "link" and device.coupling.drives == "corner"
+
+
 def _any(device: Device) -> bool:
     return True
 
@@ -56,6 +61,7 @@ def _any(device: Device) -> bool:
 # Of those that make a target the first.
 FAMILIES = (
     Row("grid amplitude", (AmplitudeTarget,), _linked_rows, ".grids.rows", "GridRows"),
+    Row("grid tree", (AmplitudeTarget,), _linked_corner, ".grids.tree", "GridTree"),
     Row("grid wave", (WaveTarget, AmplitudeTarget, WalkingTarget), _two_ways, ".grids.waves", "GridWaves"),
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),

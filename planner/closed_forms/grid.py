@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-__all__ = ["GridLinks", "GridWave", "drives_of", "motion_under", "plane_wave", "stage_constants", "transfer"]
+__all__ = [
+    "GridLinks",
+    "GridWave",
+    "drives_of",
+    "motion_of",
+    "motion_under",
+    "plane_wave",
+    "stage_constants",
+    "transfer",
+]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -105,6 +114,21 @@ def motion_under(device: Device, drive: Complexes, links: GridLinks, omega: floa
         push = drive[row, col] + (links.right[row, col] * phasor[row, col - 1] if col else 0.0)
         push += links.down[row, col] * phasor[row - 1, col] if row else 0.0
         phasor[row, col] = _lowest(complex(linear[row, col]), 0.75 * device.beta, complex(push))
+    return phasor
+
+
+def motion_of(device: Device, size: Floats, links: GridLinks, omega: float) -> Complexes:
+    """The motion of amplitudes that are known, where each is driven (and then real) or fed over links.
+
+    Parameters
+    ----------
+    size : float64, shape (rows, cols), dimensionless.
+    """
+    phasor, stage = np.zeros(size.shape, dtype=np.complex128), stage_constants(device, links, omega, size)
+    for row, col in np.argwhere(size > 0):
+        push = links.right[row, col] * phasor[row, col - 1] if links.right[row, col] else 0j
+        push += links.down[row, col] * phasor[row - 1, col] if links.down[row, col] else 0j
+        phasor[row, col] = push / stage[row, col] if push else size[row, col]
     return phasor
 
 

@@ -9,6 +9,7 @@ stronger, rows and columns change places.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..transitions import jets
 from ..transitions.jets import Jet
 from .point import ramp_of
 
-__all__ = ["enter_grid", "leave_grid"]
+__all__ = ["enter_grid", "leave_grid", "quickest"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -39,34 +40,48 @@ WATCHED_S, PARTS = 0.3, 3
 
 def enter_grid(device: Device, point: OperatingPoint) -> Ramp:
     """From rest to a plane wave, the quickest that keeps to the limits and stands in the full equations."""
-    return _quickest(device, point, rises=True)
+    return quickest(device, point, LENGTHS_S, lambda length_s: _Way(device, point, length_s, rises=True).told)
 
 
 def leave_grid(device: Device, point: OperatingPoint) -> Ramp:
     """From a plane wave to rest, on the same way backwards; its links stay as they are."""
-    ramp = _quickest(device, point, rises=False)
+    ramp = quickest(
+        device, point, LENGTHS_S, lambda length_s: _Way(device, point, length_s, rises=False).told, rises=False
+    )
     ends = np.array([0.0, ramp.duration_s])
     return replace(ramp, lam_t_s=ends, lam=np.repeat(point.lam[None, :], 2, axis=0))
 
 
-def _quickest(device: Device, point: OperatingPoint, *, rises: bool) -> Ramp:
-    lacking = ""
-    for length_s in LENGTHS_S:
-        way = _Way(device, point, length_s * device.tau_per_s, rises)
-        lacking = way.lacking
+def quickest(
+    device: Device,
+    point: OperatingPoint,
+    lengths_s: Sequence[float],
+    way: Callable[[float], tuple[Ramp, str]],
+    *,
+    rises: bool = True,
+) -> Ramp:
+    """The shortest way, of one or more, that keeps to the limits and, if it rises, leaves next to nothing ringing.
+
+    Parameters
+    ----------
+    way : gives the ramp of a length in seconds, and a clause on what it takes too much of.
+    """
+    for length_s in lengths_s:
+        ramp, lacking = way(length_s)
         if not lacking and rises:
-            error = _error_after(device, point, way.ramp)
+            error = _error_after(device, point, ramp)
             if error > AMPLITUDE_ERROR_LIMIT / 2:
                 lacking = f"its way in leaves {100 * error:.2g} % of full scale ringing; it lacks time"
         if not lacking:
-            return way.ramp
-    return replace(way.ramp, lacking=lacking)
+            return ramp
+    return replace(ramp, lacking=lacking)
 
 
 class _Way:
-    """One way of a length in tau: the drives at its nodes, and the largest amplitude on it."""
+    """One way of a length in seconds: the drives at its nodes, and the largest amplitude on it."""
 
-    def __init__(self, device: Device, point: OperatingPoint, duration: float, rises: bool) -> None:
+    def __init__(self, device: Device, point: OperatingPoint, length_s: float, *, rises: bool) -> None:
+        duration = length_s * device.tau_per_s
         self._device, self._omega = device, point.omega
         links, shape = GridLinks.of(device, point.lam), (device.rows, device.cols)
         phasor, across, along = point.phasor.reshape(shape), links.right, links.down
@@ -78,12 +93,16 @@ class _Way:
         self._peak = max(float(np.abs(one[0]).max()) for row in envelopes for one in row)
         force = self._drives(envelopes, across, along)
         epsilon, slope = (np.array([force[place][k] for place in device.driven], dtype=np.complex128) for k in (0, 1))
-        t_s = np.linspace(0.0, duration / device.tau_per_s, NODES)
+        t_s = np.linspace(0.0, length_s, NODES)
         self.ramp = ramp_of(device, point.omega, t_s, epsilon, slope * device.tau_per_s)
         self._strongest = float(np.abs(epsilon).max())
 
     @property
-    def lacking(self) -> str:
+    def told(self) -> tuple[Ramp, str]:
+        """The ramp, and what it lacks."""
+        return self.ramp, self._lacking()
+
+    def _lacking(self) -> str:
         """One clause on what the way takes too much of, "" when nothing."""
         device = self._device
         if self._strongest > device.epsilon_max:
