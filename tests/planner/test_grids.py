@@ -138,6 +138,36 @@ def test_dots_are_felt_through_the_file(tmp_path: Path) -> None:
     assert felt[wanted == 0].max() < 0.11
 
 
+@pytest.mark.slow
+def test_one_drive_makes_dots_through_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "corner.npz"
+    wanted = (np.random.default_rng(8).random((6, 6)) < 0.3).astype(float)
+    plan = plan_scene(
+        Scene(SHAPE, (Frame(TargetPattern(wanted.astype(np.complex128)), dwell_s=5.0),)), drives(LINKED, "corner")
+    )
+    frame = next(iter(plan.frames))
+    assert frame.outcome is Outcome.OK, frame.note
+    write_plan(plan, path)
+    assert verify(path).ok
+    felt = np.abs(felt_after(path, until_s=frame.settled_s + 0.12))
+    assert felt[wanted > 0] == pytest.approx(np.ones(int(wanted.sum())), abs=0.02)
+    assert felt[wanted == 0].max() < 0.11
+
+
+def test_one_drive_leaves_dots_silent_that_nobody_listens_to() -> None:
+    wanted = np.zeros((6, 6))
+    wanted[0] = wanted[:, 0] = 1
+    frame = planned(drives(LINKED, "corner"), TargetPattern(wanted.astype(np.complex128)))
+    assert not frame.states[0].phasor.reshape(6, 6)[1:, 1:].any()
+
+
+def test_too_many_stages_for_one_drive_are_refused_with_what_lacks() -> None:
+    frame = planned(drives(LINKED, "corner"), TargetPattern(np.ones((6, 6), dtype=np.complex128)))
+    assert frame.outcome is Outcome.UNREACHABLE
+    assert "it lacks drives" in frame.note
+    assert np.abs(frame.states[0].phasor) == pytest.approx(np.full(36, LINKED.full_scale))
+
+
 def test_a_pattern_changes_into_another_without_rest(tmp_path: Path) -> None:
     path = tmp_path / "two.npz"
     first, second = np.eye(6), 1 - np.eye(6)
