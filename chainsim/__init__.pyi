@@ -115,15 +115,15 @@ from .model.device import (
     device_names as device_names,
     load_device as load_device,
 )
+from .model.parts import (
+    HigherMode as HigherMode,
+    Surroundings as Surroundings,
+)
 from .model.response import (
     Branch as Branch,
     Outcome as Outcome,
     Response as Response,
     Stats as Stats,
-)
-from .model.surroundings import (
-    HigherMode as HigherMode,
-    Surroundings as Surroundings,
 )
 from .npy_header import (
     NpyHeader as NpyHeader,

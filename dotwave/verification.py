@@ -96,7 +96,9 @@ class _Integration:
         manifest = self._manifest
         index = np.arange(self.position, self.position + len(volts))
         force = forces_under(volts, manifest, self._built)
-        z = self._grid.advance(force, manifest.lam_at(index / manifest.rate_hz) * self._built.lam_gain)
+        times_s = index / manifest.rate_hz
+        lam = manifest.lam_at(times_s) * self._built.lam_gain
+        z = self._grid.advance(force, lam, manifest.lam_y_at(times_s))
         for fit in self._fits[self._first :]:
             if fit.first > index[-1]:
                 break

@@ -49,13 +49,12 @@ class Channel:
 
 
 def channels_of(device: Device) -> tuple[Channel, ...]:
-    """The channels of `device`: a drive for every chain, then a bias for every actuator that has one."""
+    """The channels of `device`: the drives, then a bias for every actuator that has one."""
 
     def places() -> Iterator[tuple[Role, tuple[int, int | None]]]:
-        for row in range(device.rows):
-            for chain in range(device.chains_per_row):
-                col = chain * device.chain_length if device.chains_per_row > 1 else None
-                yield Role.DRIVE, (row, col)
+        several = device.grid or device.chains_per_row > 1
+        for row, col in device.driven:
+            yield Role.DRIVE, (row, col if several else None)
         if device.bias == "actuator":
             for row, actuator in product(range(device.rows), range(device.cols)):
                 yield Role.BIAS, (row, actuator)

@@ -155,5 +155,7 @@ from .textures import (
     levels as levels,
     plane_wave as plane_wave,
     regions as regions,
+    rings as rings,
+    slanted_bars as slanted_bars,
     walking_bars as walking_bars,
 )

@@ -12,9 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import EncodeError
 from .scene import GridShape, PatternKind, TargetPattern, WalkingBars
 
-__all__ = ["Region", "TextureError", "bars", "levels", "plane_wave", "regions", "walking_bars"]
+__all__ = [
+    "Region", "TextureError", "bars", "levels", "plane_wave", "regions", "rings", "slanted_bars", "walking_bars",
+]  # fmt: skip
 
+Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+EDGE_DECIMALS = 9
 
 
 class TextureError(EncodeError, ValueError):
@@ -57,6 +62,50 @@ def bars(
     line = np.where([(place - first) % (width + gap) < width for place in places], _level(level), 0.0)
     grid = np.broadcast_to(line if vertical else line[:, None], (shape.rows, shape.cols))
     return _target(grid, PatternKind.BARS)
+
+
+def slanted_bars(
+    shape: GridShape, *, angle_deg: float, width: float, gap: float, first: float = 0.0, level: float = 1.0
+) -> TargetPattern:
+    """Still bars at an angle: 0 lies, 90 stands, between them they rise to the right.
+
+    Parameters
+    ----------
+    width, gap : of a bar and of what is flat between two, in actuators across the bars.
+    first : where a bar begins, actuators across the bars from the upper left actuator.
+
+    Raises
+    ------
+    TextureError
+        When a number is not finite, width or gap is below 1, or the level is not in (0, 1].
+    """
+    if not (math.isfinite(angle_deg) and math.isfinite(first)):
+        raise TextureError(f"slanted bars: expected a finite angle and first, got {angle_deg} and {first}")
+    row, col = np.mgrid[: shape.rows, : shape.cols]
+    angle = math.radians(math.fmod(angle_deg, 360.0))
+    return _striped(col * math.sin(angle) + row * math.cos(angle) - first, width, gap, level, "slanted bars")
+
+
+def rings(
+    shape: GridShape, *, row: float, col: float, width: float, gap: float, first: float = 0.0, level: float = 1.0
+) -> TargetPattern:
+    """Still rings around a point, which may lie between actuators or beside the grid.
+
+    Parameters
+    ----------
+    row, col : the point, counted from 0.
+    width, gap : of a ring and of what is flat between two, in actuators outwards.
+    first : where a ring begins, actuators from the point; 0 makes a raised disc of it.
+
+    Raises
+    ------
+    TextureError
+        When a number is not finite, width or gap is below 1, or the level is not in (0, 1].
+    """
+    if not (math.isfinite(row) and math.isfinite(col) and math.isfinite(first)):
+        raise TextureError(f"rings: expected a finite row, col and first, got {row}, {col} and {first}")
+    rows, cols = np.mgrid[: shape.rows, : shape.cols]
+    return _striped(np.hypot(rows - row, cols - col) - first, width, gap, level, "rings")
 
 
 def walking_bars(
@@ -148,6 +197,15 @@ def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
     waves = [part.texture.kind for part in parts if part.texture.phase_matters]
     target = _target(amplitude, waves[0] if waves else PatternKind.ON_OFF, phase_matters=bool(waves))
     return replace(target, any_phase=any_phase) if waves and any_phase.any() else target
+
+
+def _striped(place: Floats, width: float, gap: float, level: float, name: str) -> TargetPattern:
+    """Raised where the remainder of a place, by width and gap together, is below the width."""
+    if not (1 <= width < math.inf and 1 <= gap < math.inf):
+        raise TextureError(f"{name}: expected width and gap of 1 or more actuators, got {width} and {gap}")
+    # What lies on an edge does so whatever the angle's sine was rounded to.
+    part = np.mod(np.round(place, EDGE_DECIMALS), width + gap)
+    return _target(np.where(part < width, _level(level), 0.0), PatternKind.BARS)
 
 
 def _level(level: float) -> float:

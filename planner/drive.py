@@ -171,13 +171,16 @@ class DriveTone:
         return hold.raised(envelope, np.interp(t_s, self.t_s, self.slopes), tau_per_s)
 
 
-def tones_of(point: OperatingPoint, ramp: Ramp | None) -> Iterator[DriveTone]:
-    """The tones that sound on a ramp or at the point it leads to, each frequency once."""
-    held = {tone.omega: tone.epsilon for tone in point.every_tone}
+def tones_of(point: OperatingPoint, ramp: Ramp | None, place: int = 0) -> Iterator[DriveTone]:
+    """The tones that sound on a ramp or at the point it leads to, each frequency once.
+
+    `place` : of the actuator that is driven, as in `PointTone`.
+    """
+    held = {tone.omega: tone.epsilon for tone in point.every_tone if tone.place == place}
     way: dict[float, tuple[Complexes | None, Complexes | None]] = {}
     if ramp is not None:
-        way = {point.omega: (ramp.epsilon, ramp.epsilon_slope)}
-        way |= {tone.omega: (tone.epsilon, tone.epsilon_slope) for tone in ramp.tones}
+        way = {} if place else {point.omega: (ramp.epsilon, ramp.epsilon_slope)}
+        way |= {tone.omega: (tone.epsilon, tone.epsilon_slope) for tone in ramp.tones if tone.place == place}
     end_s, t_s = (-math.inf, None) if ramp is None else (ramp.duration_s, ramp.t_s)
     for omega in dict.fromkeys([*held, *way]):
         tone = DriveTone(omega, held.get(omega, 0j), end_s, t_s, *way.get(omega, (None, None)))
@@ -185,13 +188,16 @@ def tones_of(point: OperatingPoint, ramp: Ramp | None) -> Iterator[DriveTone]:
             yield tone
 
 
-def samples(device: Device, point: OperatingPoint, ramp: Ramp | None, tau: Floats, start: float = 0.0) -> Floats:
+def samples(
+    device: Device, point: OperatingPoint, ramp: Ramp | None, tau: Floats, start: float = 0.0, place: int = 0
+) -> Floats:
     """The drive's force at evenly spaced samples, such that straight lines between them pass what is meant.
 
     Parameters
     ----------
     tau : float64, shape (S,), S > 1, from the start of the ramp.
     start : of the ramp, tau from that of the whole plan.
+    place : of the actuator that is driven, as in `PointTone`.
 
     Returns
     -------
@@ -199,7 +205,7 @@ def samples(device: Device, point: OperatingPoint, ramp: Ramp | None, tau: Float
     """
     tau_per_s, dtau = device.tau_per_s, float(tau[1] - tau[0])
     force, t_s = np.zeros(len(tau)), tau / tau_per_s
-    for tone in tones_of(point, ramp):
+    for tone in tones_of(point, ramp, place):
         hold, end = FirstOrderHold.of(tone.omega, dtau), int(np.searchsorted(t_s, tone.end_s))
         envelope = np.full(len(tau), hold.gain * tone.held)
         rising = tone.on_ramp(t_s[:end], hold, tau_per_s)

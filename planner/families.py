@@ -39,12 +39,30 @@ def _linked(device: Device) -> bool:
     return _single(device) or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN)
 
 
+def _two_ways(device: Device) -> bool:
+    """Whether actuators are coupled in two dimensions."""
+    return device.grid
+
+
+def _linked_rows(device: Device) -> bool:
+    """Whether they are, and each row could be a chain of its own: a drive for every row and a lam per link."""
+    return device.grid and device.coupling.scope == "link" and device.coupling.drives != "corner"
+
+
+def _linked_corner(device: Device) -> bool:
+    """Whether they are, with a lam per link and one drive for them all."""
+    return device.grid and device.coupling.scope == "link" and device.coupling.drives == "corner"
+
+
 def _any(device: Device) -> bool:
     return True
 
 
 # Of those that make a target the first.
 FAMILIES = (
+    Row("grid amplitude", (AmplitudeTarget,), _linked_rows, ".grids.rows", "GridRows"),
+    Row("grid tree", (AmplitudeTarget,), _linked_corner, ".grids.tree", "GridTree"),
+    Row("grid wave", (WaveTarget, AmplitudeTarget, WalkingTarget), _two_ways, ".grids.waves", "GridWaves"),
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),

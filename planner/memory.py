@@ -50,12 +50,12 @@ class Memory:
     @property
     def kinds_at(self) -> Sequence[int]:
         """Which kind each chain of the device is; chains of one kind do the same for the same pattern."""
-        return [0] * (self.device.rows * self.device.chains_per_row)
+        return [0] * (self.device.chains)
 
     @property
     def at_rest(self) -> list[ChainTarget]:
         """All chains of the device at rest."""
-        return [self.rest] * (self.device.rows * self.device.chains_per_row)
+        return [self.rest] * (self.device.chains)
 
     def hold(
         self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None

@@ -47,12 +47,14 @@ class PointTone:
     ----------
     phasor : complex128, shape (n,), predicted amplitudes at omega, dimensionless.
     side : it is not itself wanted, but keeps those that are at their amplitudes.
+    place : which actuator of the chain it drives, from 0; only those of a grid drive others than the first.
     """
 
     omega: float
     epsilon: complex
     phasor: Complexes
     side: bool = False
+    place: int = 0
 
 
 def _no_numbers() -> Floats:
@@ -78,7 +80,7 @@ class OperatingPoint:
     Attributes
     ----------
     epsilon : complex drive phasor (modulus = drive amplitude, argument = psi).
-    lam : float64, shape (n-1,), links.
+    lam : float64, shape (n-1,), links; of a grid `Device.links` of them.
     omega : drive frequency over f0 (1.0 where nothing vibrates).
     phasor : complex128, shape (n,), predicted first harmonic, dimensionless.
     mean : float64, shape (n,).
@@ -113,6 +115,11 @@ class OperatingPoint:
         return bool(self.epsilon) or bool(self.tones)
 
     @property
+    def beats(self) -> bool:
+        """Whether an actuator is driven at several frequencies."""
+        return any(not tone.place for tone in self.tones)
+
+    @property
     def resting(self) -> bool:
         """Whether nothing vibrates: links are then free."""
         return not self.phasor.any()
@@ -124,7 +131,9 @@ class OperatingPoint:
 
 
 def setting_of(chain: Chain, points: Sequence[OperatingPoint]) -> Setting:
-    """The points as a batch for the simulator; of several tones the first. A ring is closed by a link like its first.
+    """The points as a batch for the simulator; of several tones, or driven actuators, the first.
+
+    A ring is closed by a link like its first.
 
     Parameters
     ----------
@@ -133,10 +142,15 @@ def setting_of(chain: Chain, points: Sequence[OperatingPoint]) -> Setting:
     lam = np.array([point.lam for point in points])
     if chain.closure is Closure.RING:
         lam = np.concatenate([lam[:, :1], lam], axis=1)
+    down: Floats | float = 0.0
+    if chain.rows > 1:
+        along = chain.rows * (chain.cols - 1)
+        down = lam[:, along:].reshape(-1, chain.rows - 1, chain.cols)
+        lam = lam[:, :along].reshape(-1, chain.rows, chain.cols - 1)
     epsilon = np.array([point.epsilon for point in points])
     bias = np.array([point.bias for point in points])
     omega = np.array([point.omega for point in points])
     return Setting.of(
         chain, epsilon=np.abs(epsilon), phase=np.angle(epsilon), lam=lam if lam.size else 0.0, omega=omega,
-        bias=bias if bias.size else 0.0,
+        bias=bias if bias.size else 0.0, lam_y=down,
     )  # fmt: skip

@@ -36,11 +36,13 @@ class ToneRamp:
     ----------
     omega : its frequency over f0.
     epsilon, epsilon_slope : complex128, shape (K,), as in `Ramp`.
+    place : of the actuator that it drives, as in `PointTone`.
     """
 
     omega: float
     epsilon: Complexes
     epsilon_slope: Complexes | None = None
+    place: int = 0
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class Ramp:
 class FramePlan:
     """One frame on the time line.
 
-    `states` and `ramps` go row by row, chain by chain (rows * chains_per_row of them); a ramp of None
+    `states` and `ramps` go row by row, chain by chain (`Device.chains` of them); a ramp of None
     means the chain already stands. `frame` is None for the way out after the last frame.
     `note` is one sentence when the outcome is not ok. `spread` is what the frame becomes under the device's spread,
     where it has one and the frame can be made. `contrast_db` is what was asked for, None where nothing was.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..effects.effects import Creep, Play
 from ..model.device import Device
-from ..model.surroundings import Surroundings
+from ..model.parts import Surroundings
 from .lanes import PLAYS
 
 __all__ = ["CREEP_DECADES", "CommonAmplifier", "creep_of", "plays_of"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model.device import Device
-from ..model.surroundings import HigherMode, Surroundings
+from ..model.parts import HigherMode, Surroundings
 from ..threads import in_threads
 from ..time_domain.as_built import AsBuilt
 from ..time_domain.integrate import limit_of
@@ -49,7 +49,7 @@ class DrawnDevices:
         weights: int,
     ) -> None:  # fmt: skip
         self._device, self._around, self._count = device, around, count
-        self._chains, self._n = device.rows * device.chains_per_row, device.chain_length
+        self._chains, self._n = device.chains, device.chain_length
         blocks = -(-count // WIDTH)
         drawn = DrawnNumbers(device, around, range(first, first + blocks * WIDTH), seed)
         self._seeds = drawn.seeds.reshape(blocks, WIDTH)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .calibrated import ActuatorSpread
 from .device import Device
-from .surroundings import HigherMode, Surroundings
+from .parts import HigherMode, Surroundings
 
 __all__ = ["assumed_of", "surroundings_of"]
 

@@ -10,94 +10,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..equations.chain import Chain
-from ..equations.coupling import Closure, law_of
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .surroundings import Surroundings
+from .parts import Amplifier, Coupling, Finite, Note, Part, Positive, Span, Surroundings
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, le=1024)]
-Bits = Annotated[int, Field(ge=1, le=32)]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
-
-
-class Span(_Part):
-    """A closed range of what a device can set."""
-
-    min: NotNegative
-    max: NotNegative
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Span:
-        if self.min > self.max:
-            raise ValueError(f"min {self.min} is above max {self.max}; swap them")
-        return self
-
-
-class Coupling(_Part):
-    """How actuators of a chain are coupled.
-
-    `scope` is what one lam belongs to: every link has its own (`link`), one for a chain (`chain`), one
-    for the whole device (`device`), one that was built in and cannot be set (`fixed`), or the actuators are
-    not coupled (`none`). With `bits`, lam can be set to 2^bits values from lam.min to lam.max; None is any.
-    """
-
-    closure: Closure = Closure.OPEN
-    scope: Literal["none", "fixed", "device", "chain", "link"]
-    lam: Span = Span(min=0.0, max=0.0)
-    bits: Bits | None = None
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Coupling:
-        if not law_of(self.closure).plain:
-            raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
-        if self.scope == "none" and self.lam.max > 0:
-            raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
-        if self.scope == "fixed" and self.lam.min != self.lam.max:
-            raise ValueError(f"scope fixed has one lam, got {self.lam.min} to {self.lam.max}; make min and max equal")
-        return self
-
-    @property
-    def lam_step(self) -> float:
-        """From one lam that can be set to the next; 0 where any can."""
-        return 0.0 if self.bits is None else (self.lam.max - self.lam.min) / (2**self.bits - 1)
-
-
-class Amplifier(_Part):
-    """What every output channel can do.
-
-    With `bits`, its converter makes 2^bits - 1 voltages from -volts to volts, 0 among them; None is any.
-    """
-
-    volts: Positive
-    slew_v_per_s: Positive
-    rate_hz: Annotated[int, Field(ge=100, le=10_000_000)]
-    bits: Annotated[int, Field(ge=2, le=32)] | None = None
-
-    @property
-    def volt_step(self) -> float:
-        """From one voltage to the next; 0 where any can be made."""
-        return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
-
-
-class Note(_Part):
-    """Where a value of the profile comes from."""
-
-    assumed: bool
-    why: Annotated[str, Field(min_length=1)]
 
 
 class _Places:
@@ -108,12 +33,13 @@ class _Places:
         self.at = {(one.row, one.col): one for one in actuators}
 
 
-class Device(_Part):
+class Device(Part):
     """A grid of actuators, its chains, its drive and its amplifier.
 
     Each row is cut into chains of `chain_length` actuators, which must divide `cols`; the first actuator
-    of every chain is driven. A dimensionless amplitude z is ``z * length_m`` metres; the target 1 of a
-    pattern is the amplitude `full_scale`.
+    of every chain is driven. Where actuators are coupled in two dimensions (`coupling.lam_y`) all of them are one
+    chain, row by row, and `coupling.drives` says which are driven. A dimensionless amplitude z is ``z * length_m``
+    metres; the target 1 of a pattern is the amplitude `full_scale`.
 
     Attributes
     ----------
@@ -149,7 +75,7 @@ class Device(_Part):
     description: str = ""
     rows: Count
     cols: Count
-    chain_length: Count
+    chain_length: Annotated[int, Field(ge=1, le=1024 * 1024)]
     pitch_m: Positive
     f0_hz: Positive
     delta: Annotated[float, Field(gt=0, lt=1)]
@@ -166,11 +92,13 @@ class Device(_Part):
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
     surroundings: Surroundings | None = None
-    notes: dict[str, Note] = {}
+    notes: dict[str, Note] = Field(default={})
 
     @model_validator(mode="after")
     def _consistent(self) -> Device:
-        if self.cols % self.chain_length:
+        if self.grid:
+            self._check_grid()
+        elif self.cols % self.chain_length:
             raise ValueError(f"chain_length {self.chain_length} does not divide cols {self.cols}")
         if self.omega.min <= 0:
             raise ValueError("omega.min must be above 0")
@@ -190,23 +118,63 @@ class Device(_Part):
             )
         return self
 
+    def _check_grid(self) -> None:
+        """What a grid coupled in two dimensions must be, and cannot have."""
+        if self.chain_length != self.rows * self.cols:
+            wanted = self.rows * self.cols
+            raise ValueError(f"chain_length {self.chain_length}: with coupling.lam_y it is rows times cols, {wanted}")
+        if self.bias != "none" or self.drive != "chain":
+            raise ValueError("a grid with coupling.lam_y takes bias none and drive chain")
+        for name in ("actuators", "spread"):
+            if getattr(self, name):
+                raise ValueError(f"{name}: of a grid with coupling.lam_y actuators count as equal; remove {name}")
+
     def __repr__(self) -> str:
         return f"Device({self.name!r}, {self.rows} x {self.cols})"
 
     @property
     def chains_per_row(self) -> int:
-        """How many chains a row has."""
-        return self.cols // self.chain_length
+        """How many chains a row has; 1 where all rows are one chain."""
+        return max(1, self.cols // self.chain_length)
+
+    @property
+    def chains(self) -> int:
+        """How many chains the device has."""
+        return self.rows * self.cols // self.chain_length
+
+    @property
+    def grid(self) -> bool:
+        """Whether actuators are coupled in two dimensions: one chain of all of them, row by row."""
+        return self.coupling.lam_y is not None
+
+    @property
+    def links(self) -> int:
+        """How many links a chain has: to the right, row by row, and in a grid those downwards after them."""
+        down = (self.rows - 1) * self.cols
+        return self.rows * (self.cols - 1) + down if self.grid else self.chain_length - 1
+
+    @property
+    def driven(self) -> tuple[tuple[int, int], ...]:
+        """Row and column of every actuator that has a drive, in the order of the channels: chain by chain."""
+        if not self.grid:
+            starts = range(0, self.cols, self.chain_length)
+            return tuple((row, col) for row in range(self.rows) for col in starts)
+        column = tuple((row, 0) for row in range(self.rows))
+        border = column + tuple((0, col) for col in range(1, self.cols))
+        return {"corner": column[:1], "column": column, "border": border}[self.coupling.drives or "corner"]
 
     @property
     def chain(self) -> Chain:
         """One chain of the device, for the solvers: as measured where there is no other, else as the profile says."""
-        if self.actuators and self.rows * self.chains_per_row == 1:
+        if self.actuators and self.chains == 1:
             return self.chain_at(0)
-        return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure)
+        rows = self.rows if self.grid else 1
+        return Chain(n=self.chain_length, delta=self.delta, beta=self.beta, closure=self.coupling.closure, rows=rows)
 
     def chain_at(self, row: int, index: int = 0) -> Chain:
         """Chain `index` of `row` (both from 0) with the numbers of its actuators."""
+        if self.grid:
+            return self.chain
         measured = self._measured(row, index)
         return Chain.of(
             self.chain_length,
@@ -296,7 +264,9 @@ class Device(_Part):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        left_out = {name for name in ("spread", "surroundings") if getattr(self, name) is None}
+        left_out: dict[str, Any] = {name: True for name in ("spread", "surroundings") if getattr(self, name) is None}
+        if not self.grid:
+            left_out["coupling"] = {"lam_y", "drives"}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)
 
 

@@ -51,7 +51,8 @@ class AsBuilt:
         device = self._device
         return GridIntegrator(
             shape=(device.rows, device.cols),
-            chain_length=device.chain_length,
+            chain_length=device.cols if device.grid else device.chain_length,
+            down=device.grid,
             delta=self.delta,
             beta=self.beta,
             stiffness=self.stiffness,

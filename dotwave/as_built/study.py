@@ -66,6 +66,8 @@ def verify_as_built(path: Path, study: AsBuiltStudy) -> AsBuiltReport:
     began = time.perf_counter()
     manifest, reader = read_waveform(path)
     manifest.check_digest(reader.path)
+    if manifest.device.grid:
+        raise AppError(f"--as-built: {manifest.device.name} is coupled in two dimensions, and only chains are drawn")
     around, assumed = surroundings_of(manifest.device), assumed_of(manifest.device)
     tried = {None: study.devices} | {
         effect: min(study.devices, EFFECT_DEVICES) if effect in VARYING else 1

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DeviceListing", "TableListing", "list_devices", "list_translation_tables"]
 
+_DRIVES = {"corner": "the first actuator", "column": "the first column", "border": "the first row and column"}
 _SCOPES = {
     "none": "actuators not coupled",
     "fixed": "one built-in lam",
@@ -104,13 +105,16 @@ def list_translation_tables(wanted: str | None) -> TableListing:
 
 def _summary(device: Device) -> Iterator[str]:
     yield f"{device.name}: {device.description}".rstrip(": ")
-    chains = device.rows * device.chains_per_row
+    chains = device.chains
     yield f"  grid: {device.rows} x {device.cols} actuators, {1e3 * device.pitch_m:g} mm apart"
     coupling = device.coupling
     scope = _SCOPES[coupling.scope]
     span = "" if coupling.scope == "none" else f", {coupling.lam.min:g} to {coupling.lam.max:g}"
     kind = f"{coupling.closure} chain{'' if chains == 1 else 's'}"
     yield f"  chains: {chains} {kind} of {device.chain_length}; {scope}{span}"
+    if coupling.lam_y is not None:
+        down = f"{coupling.lam_y.min:g} to {coupling.lam_y.max:g}"
+        yield f"  in two dimensions: the same downwards, {down}; driven: {_DRIVES[coupling.drives or 'corner']}"
     yield f"  bias: {'one per actuator' if device.bias == 'actuator' else 'none'}"
     drive = f"{device.omega.min * device.f0_hz:.0f} to {device.omega.max * device.f0_hz:.0f} Hz"
     shared = "common to all chains" if device.drive == "device" else "one per chain"

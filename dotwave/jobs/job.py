@@ -97,7 +97,8 @@ class GridPart(Part):
 class DevicePart(Part):
     """A device: a profile's name or file as `base`, and what is different from it.
 
-    A grid with another number of columns keeps one chain a row where the base has that. `actuators` stand in the place
+    A grid with another number of columns keeps one chain a row where the base has that, and one chain of all where the
+    base is coupled in two dimensions. `actuators` stand in the place
     of those the base has.
     """
 
@@ -152,7 +153,10 @@ class DevicePart(Part):
         """
         given = self.model_dump(exclude_none=True, exclude={"base"}, by_alias=True)
         grid = given.pop("grid", {})
-        if base.chain_length == base.cols and "cols" in grid:
+        if base.grid and grid:
+            sides = {"rows": base.rows, "cols": base.cols} | grid
+            grid = {"chain_length": sides["rows"] * sides["cols"]} | grid
+        elif base.chain_length == base.cols and "cols" in grid:
             grid = {"chain_length": grid["cols"]} | grid
         if not given and not grid:
             return base

@@ -7,7 +7,18 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
 
-from encoders import GridShape, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
+from encoders import (
+    GridShape,
+    Region,
+    TargetPattern,
+    bars,
+    levels,
+    plane_wave,
+    regions,
+    rings,
+    slanted_bars,
+    walking_bars,
+)  # fmt: skip
 
 __all__ = ["NotNegative", "Part", "Positive", "Seconds", "TexturePart"]
 
@@ -59,6 +70,27 @@ class Bars(Part):
     level: Level = 1.0
 
 
+class SlantedBars(Part):
+    """Still bars at an angle (`encoders.slanted_bars`)."""
+
+    angle_deg: Finite
+    width: Annotated[float, Field(ge=1, allow_inf_nan=False)]
+    gap: Annotated[float, Field(ge=1, allow_inf_nan=False)]
+    first: Finite = 0.0
+    level: Level = 1.0
+
+
+class Rings(Part):
+    """Still rings around a point (`encoders.rings`)."""
+
+    row: Finite
+    col: Finite
+    width: Annotated[float, Field(ge=1, allow_inf_nan=False)]
+    gap: Annotated[float, Field(ge=1, allow_inf_nan=False)]
+    first: Finite = 0.0
+    level: Level = 1.0
+
+
 class Walking(Part):
     """Bars that walk (`encoders.walking_bars`)."""
 
@@ -95,6 +127,8 @@ class TexturePart(Part):
 
     wave: WavePart | None = None
     bars: Bars | None = None
+    slanted_bars: SlantedBars | None = None
+    rings: Rings | None = None
     walking_bars: Walking | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
@@ -103,7 +137,7 @@ class TexturePart(Part):
     @model_validator(mode="after")
     def _one(self) -> TexturePart:
         if sum(value is not None for name, value in self if name != "dwell_s") != 1:
-            raise ValueError("give exactly one of wave, bars, walking_bars, levels, regions")
+            raise ValueError("give exactly one of wave, bars, slanted_bars, rings, walking_bars, levels, regions")
         return self
 
     @property
@@ -119,6 +153,10 @@ class TexturePart(Part):
         encoders.TextureError
             When it does not fit the grid.
         """
+        if self.slanted_bars is not None:
+            return slanted_bars(shape, **self.slanted_bars.model_dump())
+        if self.rings is not None:
+            return rings(shape, **self.rings.model_dump())
         if self.walking_bars is not None:
             return walking_bars(shape, **self.walking_bars.model_dump())
         if self.levels is not None:

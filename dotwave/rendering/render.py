@@ -97,7 +97,7 @@ class _Passage:
             self.totals.add(frame)
             if frame.outcome is not Outcome.OK:
                 self._failed(number, frame)
-            elif any(state.tones for state in frame.states):
+            elif any(state.beats for state in frame.states):
                 self.walks.setdefault(self._pace(frame), number)
             yield frame
 
@@ -111,7 +111,7 @@ class _Passage:
         """The slowest and the quickest walk of a frame, bars a second."""
         from planner import walking_rate_hz
 
-        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.tones)
+        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.beats)
         ends = [f"{rates[0]:.3g}", f"{rates[-1]:.3g}"]
         return " to ".join(dict.fromkeys(ends))
 

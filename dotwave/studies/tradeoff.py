@@ -164,6 +164,7 @@ def trade(
     from planner import trade_off
 
     _, plan = planned(source, device)
+    _only_chains("tradeoff", plan.device)
     found = trade_off(plan.frames, plan.device)
     chosen = [] if tol is None else [found.cheapest(tol)]
     chosen += [] if budget_s is None else [found.within(budget_s)]
@@ -225,6 +226,12 @@ def _contrast(decibels: float) -> str:
     return f"{decibels:.0f} dB" if decibels < float("inf") else "full"
 
 
+def _only_chains(command: str, device: Device) -> None:
+    """What compares ways, or rungs, does so for chains."""
+    if device.grid:
+        raise AppError(f"{command}: {device.name} is coupled in two dimensions; take a device of chains (linked-6x6)")
+
+
 def trade_frame(source: str, *, device: str | None, frame: int, picture: Path | None) -> ParetoReport:
     """The Pareto set of one frame of a scene, counted from 1.
 
@@ -234,6 +241,7 @@ def trade_frame(source: str, *, device: str | None, frame: int, picture: Path | 
         When the scene has no such frame.
     """
     scene, plan = planned(source, device, otherwise="linked-6x6")
+    _only_chains("pareto", plan.device)
     chosen = next(islice(iter(scene.frames), frame - 1, None), None) if frame > 0 else None
     if chosen is None:
         raise AppError(f"--frame: the scene has no frame {frame}; count from 1")

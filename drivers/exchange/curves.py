@@ -73,7 +73,8 @@ def haptic_curves(plan: Plan) -> HapticCurves:
         phasor = np.array([state.phasor for state in frame.states]).reshape(shape) / device.full_scale
         level = np.minimum(np.abs(phasor), 1.0)
         phase = np.where(level > 0, np.angle(phasor), phases[-1])
-        for row, state in enumerate(frame.states[:: device.chains_per_row]):
+        firsts = frame.states[:: device.chains_per_row]
+        for row, state in enumerate(firsts * device.rows if device.grid else firsts):
             if level[row].any():
                 frequency[row] = state.omega * device.f0_hz
         for time_s in (frame.settled_s, frame.end_s):

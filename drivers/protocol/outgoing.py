@@ -92,6 +92,11 @@ def check_fit_for(device: Device, found: Capabilities, lam_max: float, *, parame
         raise UnfitController(
             f"controller {found.name!r}: it gives {found.full_volts:g} V, the waveform needs {device.amplifier.volts:g}"
         )
+    if device.grid:
+        raise UnfitController(
+            f"controller {found.name!r}: its links go along rows, those of {device.name} also downwards; "
+            "play to a file (-o), which holds them"
+        )
     if lam_max > 0 and not (found.lam_step > 0 and lam_max <= found.lam_max * (1 + 1e-6)):
         raise UnfitController(f"controller {found.name!r}: its lam ends at {found.lam_max:g}, {lam_max:g} is needed")
     if parametric:

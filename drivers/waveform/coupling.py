@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +30,25 @@ class CouplingEvent:
     row : which.
     lam : cols - 1 numbers, ``lam[m - 1]`` couples actuator m-1 into m; 0 between chains.
     ramp_s : seconds that the linear change from the present value to `lam` takes; 0 is a jump.
+    lam_y : cols numbers, from the row above into this one, of a grid coupled in two dimensions; 0 in its first row.
+        Empty elsewhere.
     """
 
     t_s: float
     row: int
     lam: tuple[float, ...]
     ramp_s: float
+    lam_y: tuple[float, ...] = ()
+
+    @property
+    def every_lam(self) -> tuple[float, ...]:
+        """All of them, those downwards last."""
+        return (*self.lam, *self.lam_y)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The event in plain JSON types, as it stands in a manifest."""
+        down = {"lam_y": self.lam_y} if self.lam_y else {}
+        return {"t_s": self.t_s, "row": self.row, "lam": self.lam, "ramp_s": self.ramp_s, **down}
 
 
 class CouplingWriter:
@@ -48,13 +62,19 @@ class CouplingWriter:
         """The events of the next frame by time, then row; none when the device has no coupling."""
         if self._device.coupling.scope == "none":
             return []
-        per_row = self._device.chains_per_row
         events: list[CouplingEvent] = []
-        for row in range(self._device.rows):
-            chains = slice(row * per_row, (row + 1) * per_row)
-            path = _RowPath.of(self._device, frame.states[chains], frame.ramps[chains])
+        for row, path in enumerate(self._paths(frame)):
             events.extend(self._row_events(row, frame.start_s, path))
         return sorted(events, key=lambda event: (event.t_s, event.row))
+
+    def _paths(self, frame: FramePlan) -> Iterator[_RowPath]:
+        if self._device.grid:
+            yield from _RowPath.of_grid(self._device, frame.states[0], frame.ramps[0])
+            return
+        per_row = self._device.chains_per_row
+        for row in range(self._device.rows):
+            chains = slice(row * per_row, (row + 1) * per_row)
+            yield _RowPath.of(self._device, frame.states[chains], frame.ramps[chains])
 
     def _row_events(self, row: int, start_s: float, path: _RowPath) -> Iterator[CouplingEvent]:
         times = [round(start_s + t, TIME_DECIMALS) for t in path.t_s.tolist()]
@@ -70,14 +90,16 @@ class CouplingWriter:
         rounded = tuple(float(f"{value:.{DIGITS}g}") for value in lam.tolist())
         if rounded != self._current[row]:
             self._current[row] = rounded
-            yield CouplingEvent(t_s, row, rounded, ramp_s)
+            along = self._device.cols - 1
+            yield CouplingEvent(t_s, row, rounded[:along], ramp_s, rounded[along:])
 
 
 @dataclass(frozen=True)
 class _RowPath:
     """A row's links in one frame: linear between the times, with a jump at a time where before != after.
 
-    t_s : float64, shape (K,), from the frame's start. before, after : float64, shape (K, cols-1).
+    t_s : float64, shape (K,), from the frame's start. before, after : float64, shape (K, cols-1), in a grid
+    (K, 2 cols-1): the links downwards behind those to the right.
     """
 
     t_s: Floats
@@ -98,6 +120,22 @@ class _RowPath:
             after[:, links] = links_at(state, ramp, t_s)
         return cls(t_s, before, after)
 
+    @classmethod
+    def of_grid(cls, device: Device, state: OperatingPoint, ramp: Ramp | None) -> Iterator[_RowPath]:
+        """The paths of all rows of a grid coupled in two dimensions."""
+        nodes = [] if ramp is None or ramp.lam_t_s is None else ramp.lam_t_s.tolist()
+        t_s = np.array(sorted({0.0, *nodes}))
+        before, after = (links_at(state, ramp, t_s, before=ahead) for ahead in (True, False))
+        along = device.rows * (device.cols - 1)
+
+        def rows(links: Floats) -> Floats:
+            right = links[:, :along].reshape(len(t_s), device.rows, -1)
+            down = links[:, along:].reshape(len(t_s), device.rows - 1, device.cols)
+            return np.concatenate([right, np.pad(down, ((0, 0), (1, 0), (0, 0)))], axis=2)
+
+        for one, other in zip(rows(before).swapaxes(0, 1), rows(after).swapaxes(0, 1), strict=True):
+            yield cls(t_s, one, other)
+
 
 class LamTrack:
     """lam of every link at any time, from the events of a manifest.
@@ -106,13 +144,14 @@ class LamTrack:
     ----------
     events : by time within each row.
     rows, cols : the grid.
+    down : whether it is coupled in two dimensions.
     """
 
-    def __init__(self, events: Iterable[CouplingEvent], rows: int, cols: int) -> None:
+    def __init__(self, events: Iterable[CouplingEvent], rows: int, cols: int, *, down: bool = False) -> None:
         of_row: list[list[CouplingEvent]] = [[] for _ in range(rows)]
         for event in events:
             of_row[event.row].append(event)
-        self._rows = [_RowTrack.of(row, cols) for row in of_row]
+        self._rows = [_RowTrack.of(row, 2 * cols - 1 if down else cols - 1) for row in of_row]
         self._cols = cols
 
     def at(self, times_s: Floats) -> Floats:
@@ -128,8 +167,17 @@ class LamTrack:
         """
         lam = np.zeros((len(times_s), len(self._rows), self._cols))
         for row, track in enumerate(self._rows):
-            lam[:, row, 1:] = track.at(times_s)
+            lam[:, row, 1:] = track.at(times_s)[:, : self._cols - 1]
         return lam
+
+    def down_at(self, times_s: Floats) -> Floats:
+        """Links downwards of a grid at the given times.
+
+        Returns
+        -------
+        float64, shape (S, rows, cols); ``[:, r, c]`` couples actuator (r - 1, c) into (r, c), and row 0 is 0.
+        """
+        return np.stack([track.at(times_s)[:, self._cols - 1 :] for track in self._rows], axis=1)
 
 
 @dataclass(frozen=True)
@@ -142,9 +190,9 @@ class _RowTrack:
     after: Floats
 
     @classmethod
-    def of(cls, events: Sequence[CouplingEvent], cols: int) -> _RowTrack:
-        after = np.zeros((len(events) + 1, cols - 1))
-        after[1:] = [event.lam for event in events] or np.zeros((0, cols - 1))
+    def of(cls, events: Sequence[CouplingEvent], links: int) -> _RowTrack:
+        after = np.zeros((len(events) + 1, links))
+        after[1:] = [event.every_lam for event in events] or np.zeros((0, links))
         before = np.zeros_like(after)
         # Until the first event every link is 0.
         start_s = np.array([-np.inf, *(event.t_s for event in events)])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,7 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
     """A frame as it stands in a manifest, `number` in it; raises WaveformError where that cannot say it."""
     assert frame.frame is not None
     assert frame.wish is not None
-    per_row = device.chains_per_row
-    rows = [frame.states[row * per_row : (row + 1) * per_row] for row in range(device.rows)]
+    rows = [tuple(states) for states in _by_row(device, frame)]
     places = [f"frame {number}, row {index}" for index in range(device.rows)]
     moving = [_moving(row, place) for row, place in zip(rows, places, strict=True)]
     mark = {
@@ -51,6 +51,19 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
     if frame.spread is not None:
         mark["spread"] = frame.spread.as_dict()
     return mark
+
+
+def _by_row(device: Device, frame: FramePlan) -> Iterator[Sequence[OperatingPoint]]:
+    """The states of every row; of a grid that is one chain its parts."""
+    per_row, cols = device.chains_per_row, device.cols
+    for row in range(device.rows):
+        if device.grid:
+            own = slice(row * cols, (row + 1) * cols)
+            whole = frame.states[0]
+            phase = None if whole.phase is None else whole.phase[own]
+            yield [replace(whole, target=whole.target[own], phase=phase)]
+        else:
+            yield frame.states[row * per_row : (row + 1) * per_row]
 
 
 def _moving(states: tuple[OperatingPoint, ...], place: str) -> bool:

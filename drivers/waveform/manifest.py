@@ -124,7 +124,7 @@ class Manifest:
 
     @cached_property
     def _lam(self) -> LamTrack:
-        return LamTrack(self.coupling, self.device.rows, self.device.cols)
+        return LamTrack(self.coupling, self.device.rows, self.device.cols, down=self.device.grid)
 
     def lam_at(self, times_s: Floats) -> Floats:
         """Links at a block of times (float64, shape (S,), seconds); memory is that of the answer.
@@ -138,6 +138,10 @@ class Manifest:
         if self.device.coupling.closure is Closure.RING and self.device.chain_length > 1:
             lam[:, :, :: self.device.chain_length] = lam[:, :, 1 :: self.device.chain_length]
         return lam
+
+    def lam_y_at(self, times_s: Floats) -> Floats | None:
+        """Links downwards at a block of times, as `LamTrack.down_at`; None where the device has none."""
+        return self._lam.down_at(times_s) if self.device.grid else None
 
     def check_digest(self, path: Path) -> None:
         """Compare the bytes of the samples file at `path` with `digest`.
@@ -226,7 +230,7 @@ class ManifestWriter:
         """
         with naming(self._path):
             for event in self._coupling.events(frame):
-                self._events.add({"t_s": event.t_s, "row": event.row, "lam": event.lam, "ramp_s": event.ramp_s})
+                self._events.add(event.as_dict())
             if frame.frame is not None:
                 self._marks.add(frame_entry(self._device, frame, self.frames))
                 for heading in frame.frame.headings:

@@ -54,6 +54,7 @@ class _Event(_Part):
     row: Index
     lam: list[Finite]
     ramp_s: Seconds
+    lam_y: list[Finite] = []
 
 
 class _GoesOn(_Part):
@@ -183,6 +184,7 @@ class _Check:
 
     def _channels(self, channels: list[_Channel]) -> None:
         driven: set[tuple[Role, int, int]] = set()
+        begins = set(self._device.driven)
         for index, channel in enumerate(channels):
             place = f"channels[{index}]"
             if channel.index != index:
@@ -192,7 +194,7 @@ class _Check:
                 self._refuse(f"{place}.col", f"expected 0 to {self._device.cols - 1}, got {channel.col}")
             if channel.role is Role.BIAS and channel.col is None:
                 self._refuse(f"{place}.col", "a bias channel needs a col")
-            if channel.role is Role.DRIVE and (channel.col or 0) % self._device.chain_length:
+            if channel.role is Role.DRIVE and (channel.row, channel.col or 0) not in begins:
                 self._refuse(f"{place}.col", f"no chain begins at col {channel.col}")
             target = (channel.role, channel.row, channel.col or 0)
             if target in driven:
@@ -203,6 +205,9 @@ class _Check:
         self._row(place, event.row)
         if len(event.lam) != self._device.cols - 1:
             self._refuse(f"{place}.lam", f"expected {self._device.cols - 1} numbers, got {len(event.lam)}")
+        downwards = self._device.cols if self._device.grid else 0
+        if len(event.lam_y) != downwards:
+            self._refuse(f"{place}.lam_y", f"expected {downwards} numbers, got {len(event.lam_y)}")
         if event.t_s < last[event.row]:
             self._refuse(f"{place}.t_s", f"{event.t_s} s is before the event ahead of it, at {last[event.row]} s")
         last[event.row] = event.t_s
@@ -242,7 +247,7 @@ def _manifest(file: _File) -> Manifest:
         digest=file.digest,
         device=file.device,
         channels=tuple(Channel(c.index, c.role, c.row, c.col, c.volts_per_unit) for c in file.channels),
-        coupling=tuple(CouplingEvent(e.t_s, e.row, tuple(e.lam), e.ramp_s) for e in file.coupling),
+        coupling=tuple(CouplingEvent(e.t_s, e.row, tuple(e.lam), e.ramp_s, tuple(e.lam_y)) for e in file.coupling),
         frames=tuple(_mark(frame, file.device) for frame in file.frames),
         encoding=file.encoding,
         headings=tuple(HeadingMark(h.level, h.text, h.frame, h.page, h.start_s) for h in file.headings),

@@ -158,23 +158,27 @@ def volts_of(device: Device, frame: FramePlan, index: NDArray[np.intp]) -> Float
     time_s = index / device.amplifier.rate_hz
     since_s = time_s - frame.start_s
     biases = device.rows * device.cols if device.bias == "actuator" else 0
-    out = np.zeros((len(frame.states) + biases, len(index)))
+    driven = len(device.driven)
+    out = np.zeros((driven + biases, len(index)))
     carriers: dict[float, _Carrier] = {}
-    equal: dict[tuple[int, int], int] = {}
-    for number, (state, ramp) in enumerate(zip(frame.states, frame.ramps, strict=True)):
+    equal: dict[tuple[int, int, int], int] = {}
+    for number, (row, col) in enumerate(device.driven):
+        # A grid is one chain with several drives; of all other chains the first actuator is driven.
+        chain, place = (0, row * device.cols + col) if device.grid else (number, 0)
+        state, ramp = frame.states[chain], frame.ramps[chain]
         # Equal rows come from the planner's cache as the same objects: sampled once, then copied.
-        first = equal.setdefault((id(state), id(ramp)), number)
+        first = equal.setdefault((id(state), id(ramp), place), number)
         if first < number:
             out[number] = out[first]
         else:
-            for tone in tones_of(state, ramp):
+            for tone in tones_of(state, ramp, place):
                 if tone.omega not in carriers:
                     carriers[tone.omega] = _Carrier.of(tone.omega, device.tau_per_s * time_s, device)
                 _drive(tone, since_s, carriers[tone.omega], out[number])
-    drives = out[: len(frame.states)]
+    drives = out[:driven]
     drives /= device.epsilon_per_volt
     if biases:
-        stills = out[len(frame.states) :].reshape(len(frame.states), device.chain_length, -1)
+        stills = out[driven:].reshape(len(frame.states), device.chain_length, -1)
         for state, ramp, rows in zip(frame.states, frame.ramps, stills, strict=True):
             _bias(state, ramp, since_s, device.bias_per_volt, rows)
     return out

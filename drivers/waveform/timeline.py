@@ -58,7 +58,7 @@ def _check_times(place: str, frame: FramePlan) -> None:
 
 
 def _check_chains(place: str, device: Device, frame: FramePlan) -> None:
-    wanted = device.rows * device.chains_per_row
+    wanted = device.chains
     if (len(frame.states), len(frame.ramps)) != (wanted, wanted):
         raise WaveformError(
             f"{place}: {len(frame.states)} states and {len(frame.ramps)} ramps for the {wanted} chains of {device.name}"
@@ -81,7 +81,7 @@ def _check_state(where: str, device: Device, state: OperatingPoint) -> None:
     n = device.chain_length
     _check_array(f"{where}: target", state.target, (n,))
     _check_array(f"{where}: bias", state.bias, (n,))
-    _check_array(f"{where}: lam", state.lam, (n - 1,))
+    _check_array(f"{where}: lam", state.lam, (device.links,))
     if device.bias == "none" and np.any(state.bias):
         raise WaveformError(f"{where}: a bias of {state.bias[np.flatnonzero(state.bias)[0]]}, but {_no_bias(device)}")
     for omega in (state.omega, *(tone.omega for tone in state.tones)):
@@ -121,7 +121,7 @@ def _check_ramp(where: str, device: Device, ramp: Ramp, longest: float) -> None:
         raise WaveformError(f"{where}: ramp.lam and ramp.lam_t_s: give both or neither")
     if ramp.lam is not None and ramp.lam_t_s is not None:
         _check_nodes(f"{where}: ramp.lam_t_s", ramp.lam_t_s, longest)
-        _check_array(f"{where}: ramp.lam", ramp.lam, (len(ramp.lam_t_s), n - 1))
+        _check_array(f"{where}: ramp.lam", ramp.lam, (len(ramp.lam_t_s), device.links))
 
 
 def _no_bias(device: Device) -> str:

@@ -56,7 +56,7 @@ class Deflection(AmplitudeFamily):
         """What the links into each actuator make of the smallest lam; the first of a ring closes it."""
         device = self.device
         links = np.full(device.chain_length, device.coupling.lam.min)
-        if device.actuators and device.rows * device.chains_per_row == 1:
+        if device.actuators and device.chains == 1:
             links[1:] *= device.lam_gain(0)
         return links
 

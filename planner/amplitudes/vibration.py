@@ -114,7 +114,7 @@ class Vibration(AmplitudeFamily):
         known = np.any(targets > 0, axis=1)
         known[known] = np.isfinite(links_for(self.device.chain, amplitude[known], self.band.omega)).all(axis=1)
         whole = (self._whole or self).device
-        common = self.band.omega, whole.rows * whole.chains_per_row
+        common = self.band.omega, whole.chains
         asked = zip(targets, goals, known, strict=True)
         return np.array([aim_for(self.device, one, *common, goal) if fine else one for one, goal, fine in asked])
 
@@ -186,7 +186,7 @@ class Vibration(AmplitudeFamily):
     def _outside(self, lam: Floats) -> bool:
         """Whether links of shape (..., n-1) must be set beyond their range."""
         allowed, device = self.device.coupling.lam, self.device
-        if device.actuators and device.rows * device.chains_per_row == 1:
+        if device.actuators and device.chains == 1:
             lam = lam / device.lam_gain(0)
         return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
 

@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import ActuatorSpread, Chain, Closure, HigherMode, Surroundings
+from chainsim import ActuatorSpread, Chain, HigherMode, Surroundings
 
-from ..operating_point import OperatingPoint, PointTone
+from ..operating_point import OperatingPoint, PointTone, setting_of
 
 __all__ = ["Linearisation", "pattern_error"]
 
@@ -43,15 +43,26 @@ class Linearisation:
     @cached_property
     def lam(self) -> Floats:
         """Links, float64, shape (n,); the first closes a ring and is 0 otherwise."""
-        closing = self.point.lam[:1] if self.chain.closure is Closure.RING else np.zeros(1)
-        return np.concatenate([closing, self.point.lam])
+        return np.asarray(setting_of(self.chain, [self.point]).lam[0])
+
+    @cached_property
+    def down(self) -> Floats | None:
+        """Links of a grid from the actuators above, float64, shape (n,); None of a chain."""
+        return None if self.chain.rows == 1 else np.asarray(setting_of(self.chain, [self.point]).lam_y)[0]
+
+    def along(self, motion: Complexes) -> Complexes:
+        """What the links pull each actuator with under a motion; complex128, shape (n,)."""
+        force = self.lam * (np.roll(motion, 1) - motion)
+        if self.down is not None:
+            force = force + self.down * (np.roll(motion, self.chain.cols) - motion)
+        return np.asarray(force)
 
     @cached_property
     def lines(self) -> tuple[PointTone, ...]:
         """Of its vibration, the first is that at the point's own frequency; one of omega 0 for a deflection."""
         if not self.moving:
             return (PointTone(0.0, 0j, self.point.mean.astype(np.complex128)),)
-        return self.point.every_tone
+        return tuple(tone for tone in self.point.every_tone if not tone.place)
 
     @cached_property
     def moving(self) -> bool:
@@ -68,18 +79,28 @@ class Linearisation:
         """Largest amplitude of each actuator, all lines in step; float64, shape (n,)."""
         return np.asarray(np.sum([np.abs(line.phasor) for line in self.lines], axis=0))
 
+    def driven(self, line: PointTone) -> Complexes:
+        """Force of the drives at the line's frequency on each actuator; complex128, shape (n,)."""
+        force = np.zeros(self.chain.n, dtype=np.complex128)
+        for tone in self.point.every_tone:
+            if tone.omega == line.omega:
+                force[tone.place] += tone.epsilon
+        return force
+
     def electric(self, line: PointTone) -> Complexes:
         """Force through the piezo of each actuator: drive, bias, and what its link brings; complex128, shape (n,)."""
-        force = self.lam * (np.roll(line.phasor, 1) - line.phasor)
-        force[0] += line.epsilon
+        force = self.along(line.phasor) + self.driven(line)
         return force + (self.point.bias if line.omega == 0 else 0.0)
 
     def impedance(self, omega: float, stiffening: Floats | float = 0.0) -> Complexes:
         """Linear equations ``impedance @ A = force`` at a frequency, links in; complex128, shape (n, n)."""
-        chain, n = self.chain, self.chain.n
+        chain, each = self.chain, np.arange(self.chain.n)
         own = chain.stiffness + self.lam + stiffening - omega**2 + 1j * chain.deltas * omega
-        matrix: Complexes = np.diag(np.broadcast_to(own, (n,)).astype(np.complex128))
-        matrix[np.arange(n), np.arange(n) - 1] -= self.lam
+        matrix: Complexes = np.diag(np.broadcast_to(own, each.shape).astype(np.complex128))
+        matrix[each, each - 1] -= self.lam
+        if self.down is not None:
+            matrix[each, each] += self.down
+            matrix[each, each - chain.cols] -= self.down
         return matrix
 
     def moved(self, line: PointTone, force: Complexes) -> Complexes:
@@ -164,8 +185,15 @@ class Linearisation:
         for line in self.lines:
             pliant = sum(one.gain / (one.omega**2 - line.omega**2 + 1j * one.delta * line.omega) for one in modes)
             tip = pliant * self.electric(line)
-            found.append(tip + self.moved(line, self.lam * (np.roll(tip, 1) - tip)))
+            found.append(tip + self.moved(line, self.along(tip)))
         return found
+
+    def without_down(self) -> list[Complexes]:
+        """What a grid's links downwards do."""
+        if self.down is None:
+            return []
+        pulls = [self.down * (np.roll(line.phasor, self.chain.cols) - line.phasor) for line in self.lines]
+        return [self.moved(line, -pull) for line, pull in zip(self.lines, pulls, strict=True)]
 
     def pulled(self, row_lam: float, above: Linearisation) -> list[Complexes]:
         """What links from the chain above do; lines of other frequencies than its own only stiffen it.
@@ -189,9 +217,7 @@ class Linearisation:
         found = []
         for line in self.lines:
             factor = (1 / (1 + 1j * line.omega / bandwidth)) / max(1.0, slew)
-            force = np.zeros(self.chain.n, np.complex128)
-            force[0] = (factor - 1) * line.epsilon
-            found.append(self.moved(line, force))
+            found.append(self.moved(line, (factor - 1) * self.driven(line)))
         return found
 
     def scattered(self, spread: ActuatorSpread, phased: NDArray[np.bool_]) -> Floats:
@@ -203,7 +229,7 @@ class Linearisation:
                 2 * spread.frequency * chain.stiffness * line.phasor,
                 1j * spread.damping * chain.deltas * line.omega * line.phasor,
                 spread.beta * cubic,
-                spread.lam * self.lam * (np.roll(line.phasor, 1) - line.phasor),
+                spread.lam * self.along(line.phasor),
             )
             unit = line.phasor / np.maximum(np.abs(line.phasor), 1e-300)
             for cause in causes:

@@ -189,6 +189,8 @@ def _why(name: str, seen: SceneEffects) -> str:
         listed = ", ".join(f"{mode.omega * device.f0_hz:.0f} Hz" for mode in around.modes)
         return f"the tips also bend in {listed}." if listed else "none are given."
     if name == "2-D coupling":
+        if device.grid:
+            return "links downwards are the device's own, in every equation."
         return f"rows are coupled by {around.row_lam:g}." if around.row_lam else "no link joins two rows."
     if name == "amplifier dynamics":
         return f"{around.bandwidth:.3g} Hz of bandwidth for a drive near {device.f0_hz:.3g} Hz." if moving else (

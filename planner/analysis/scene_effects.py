@@ -92,7 +92,9 @@ class SceneEffects:
         beside = self.device.chains_per_row
         for at, chain in enumerate(chains):
             changes[at]["2-D coupling"] = (
-                chain.pulled(self.around.row_lam, chains[at - beside]) if at >= beside and self.around.row_lam else []
+                chain.pulled(self.around.row_lam, chains[at - beside])
+                if at >= beside and self.around.row_lam
+                else chain.without_down()
             )
         for name in changes[0]:
             off = pattern_error(plan.states, chains, [each[name] for each in changes])

@@ -101,7 +101,7 @@ class Adaptation:
         self._noise, self._still = SensorNoise(RELATIVE, absolute), SensorNoise(0.0, absolute)
         self._known = DeviceEstimate.of(device)
         self._bias = BiasEstimate.of(device) if device.bias == "actuator" else None
-        chains = device.rows * device.chains_per_row
+        chains = device.chains
         self._factors = [Factors.none(device.chain_length)] * chains
         self._held = Held.at_rest(device.rows * device.cols)
         self._waiting: deque[tuple[int, FramePlan]] = deque(maxlen=MOST_WAITING)

@@ -174,9 +174,7 @@ class BiasEstimate:
 
     def _chains(self, name: str) -> Floats:
         device = self.device
-        chains = (
-            device.chain_at(*divmod(at, device.chains_per_row)) for at in range(device.rows * device.chains_per_row)
-        )
+        chains = (device.chain_at(*divmod(at, device.chains_per_row)) for at in range(device.chains))
         return np.concatenate([np.broadcast_to(getattr(chain, name), device.chain_length) for chain in chains])
 
 

@@ -206,7 +206,7 @@ class Expectation:
 
     def _verdict(self, shown: _Shown, factor: float) -> FrameVerdict:
         device = self.device
-        felt = np.zeros((DRAWS, device.rows * device.chains_per_row, device.chain_length))
+        felt = np.zeros((DRAWS, device.chains, device.chain_length))
         worse = np.where(shown.wish.raised, -1.0, 1.0).reshape(felt.shape[1:])
         for i in shown.busy:
             one = self._one(shown, i, factor)

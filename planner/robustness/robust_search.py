@@ -103,7 +103,7 @@ class RobustSearch:
         self.judged = draw(chain.n, count=trial.count, seed=trial.seed + 1).parts(chain, spread)
         self.exact = draw(chain.n, count=1, seed=trial.seed).parts(chain, RelativeSpread())
         self.tied = device.coupling.scope in {"fixed", "device", "chain"}
-        one = device.rows * device.chains_per_row == 1
+        one = device.chains == 1
         # What each link makes of the lam it is set to; settings here are what links make.
         self.gain = device.lam_gain(0) if one else np.ones(chain.n - 1)
 

@@ -40,7 +40,8 @@ def turned_ramp(ramp: Ramp, turn: float) -> Ramp:
         return None if values is None else np.asarray(values * factor)
 
     tones = tuple(
-        ToneRamp(tone.omega, np.asarray(tone.epsilon * factor), turned(tone.epsilon_slope)) for tone in ramp.tones
+        replace(tone, epsilon=np.asarray(tone.epsilon * factor), epsilon_slope=turned(tone.epsilon_slope))
+        for tone in ramp.tones
     )
     return replace(ramp, epsilon=turned(ramp.epsilon), epsilon_slope=turned(ramp.epsilon_slope), tones=tones)
 
@@ -66,7 +67,7 @@ def rest_for(ramp: Ramp, seconds: float) -> Ramp:
     for tone in ramp.tones:
         epsilon = longer(tone.epsilon)
         assert epsilon is not None
-        tones.append(ToneRamp(tone.omega, epsilon, longer(tone.epsilon_slope)))
+        tones.append(replace(tone, epsilon=epsilon, epsilon_slope=longer(tone.epsilon_slope)))
     return replace(ramp, t_s=t_s, bias=longer(ramp.bias), bias_slope=longer(ramp.bias_slope), tones=tuple(tones))
 
 
@@ -88,14 +89,15 @@ def joined(first: Ramp, second: Ramp, before: OperatingPoint, after: OperatingPo
     for tone in first.tones:
         epsilon, slope = early(tone.epsilon), early(tone.epsilon_slope)
         assert epsilon is not None
-        if tone.omega == after.omega and own is not None and own_slope is not None and slope is not None:
+        same = tone.omega == after.omega and not tone.place
+        if same and own is not None and own_slope is not None and slope is not None:
             own, own_slope = own + epsilon, own_slope + slope
         else:
-            tones.append(ToneRamp(tone.omega, epsilon, slope))
+            tones.append(replace(tone, epsilon=epsilon, epsilon_slope=slope))
     for tone in second.tones:
         epsilon = late(tone.epsilon)
         assert epsilon is not None
-        tones.append(ToneRamp(tone.omega, epsilon, late(tone.epsilon_slope)))
+        tones.append(replace(tone, epsilon=epsilon, epsilon_slope=late(tone.epsilon_slope)))
     lam_t_s, lam = _links(first, second, before, after)
     return Ramp(
         t_s=np.concatenate([first.t_s, first.duration_s + second.t_s]),
@@ -115,15 +117,16 @@ def _sum(one: Numbers | None, other: Numbers | None) -> Numbers | None:
 
 
 def _merged(tones: list[ToneRamp]) -> tuple[ToneRamp, ...]:
-    """Each frequency once."""
-    found: dict[float, ToneRamp] = {}
+    """Each frequency of a driven actuator once."""
+    found: dict[tuple[float, int], ToneRamp] = {}
     for tone in tones:
-        same = found.get(tone.omega)
+        key = tone.omega, tone.place
+        same = found.get(key)
         if same is None:
-            found[tone.omega] = tone
+            found[key] = tone
         else:
             slope = _sum(same.epsilon_slope, tone.epsilon_slope)
-            found[tone.omega] = ToneRamp(tone.omega, same.epsilon + tone.epsilon, slope)
+            found[key] = replace(same, epsilon=same.epsilon + tone.epsilon, epsilon_slope=slope)
     return tuple(found.values())
 
 

@@ -28,7 +28,7 @@ def written(tmp_path, data):
 def test_built_in_profiles(name):
     device = load_device(name)
     assert device.name == name
-    assert device.cols % device.chain_length == 0
+    assert device.chains * device.chain_length == device.rows * device.cols
     assert device.beta == -1
     assert device.full_scale < device.escape_amplitude
     assert {"delta", "beta", "full_scale", "epsilon_per_volt"} <= {
@@ -117,7 +117,7 @@ def test_a_file_that_is_edited_is_read_anew(tmp_path):
 
 
 def test_names_that_lead_nowhere(tmp_path):
-    with pytest.raises(ProfileError, match="linked-6x6, paper-6x6"):
+    with pytest.raises(ProfileError, match="linked-6x6, linked-grid-6x6, paper-6x6"):
         load_device("nosuch")
     with pytest.raises(ProfileError, match="No such file"):
         load_device(str(tmp_path / "nosuch.yaml"))

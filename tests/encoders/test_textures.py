@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from encoders import GridShape, PatternKind, Region, TextureError, bars, levels, plane_wave, regions, walking_bars
+from encoders import (
+    GridShape,
+    PatternKind,
+    Region,
+    TextureError,
+    bars,
+    levels,
+    plane_wave,
+    regions,
+    rings,
+    slanted_bars,
+    walking_bars,
+)  # fmt: skip
 from tests.support.known import known
 
 GRID = GridShape(6, 8)
@@ -34,6 +46,28 @@ def test_numbers_however_large_make_a_texture():
     assert bars(GRID, vertical=True, width=10**30, gap=1).amplitude.all()
     assert np.isfinite(plane_wave(GRID, lag_deg=1e308, row_lag_deg=-1e308).amplitude).all()
     np.testing.assert_allclose(plane_wave(GRID, lag_deg=780).amplitude, plane_wave(GRID, lag_deg=60).amplitude)
+
+
+def test_slanted_bars_are_bars_where_they_stand_or_lie():
+    for angle, vertical in ((90, True), (0, False), (450, True)):
+        slanted = slanted_bars(GRID, angle_deg=angle, width=2, gap=1, level=0.5)
+        assert np.array_equal(slanted.amplitude, bars(GRID, vertical=vertical, width=2, gap=1, level=0.5).amplitude)
+
+
+def test_slanted_bars_rise_to_the_right():
+    raised = slanted_bars(GRID, angle_deg=45, width=1, gap=1.1).amplitude.real > 0
+    for row, col in np.argwhere(raised):
+        if row and col + 1 < GRID.cols:
+            assert raised[row - 1, col + 1]
+
+
+def test_rings_go_round_their_point():
+    found = rings(GRID, row=2, col=2, width=1, gap=1).amplitude.real
+    row, col = np.mgrid[: GRID.rows, : GRID.cols]
+    far = np.hypot(row - 2, col - 2)
+    assert np.array_equal(found > 0, far % 2 < 1)
+    assert found[2, 2] == 1
+    assert rings(GRID, row=2, col=2, width=1, gap=1, first=1).amplitude[2, 2] == 0
 
 
 def test_walking_bars_fill_the_grid():
@@ -68,6 +102,10 @@ def test_what_leaves_the_core_is_read_only():
         (lambda: plane_wave(GRID, lag_deg=60, level=1.5), "1.5"),
         (lambda: bars(GRID, vertical=True, width=0, gap=1), "width"),
         (lambda: walking_bars(GRID, width=1), "1.2"),
+        (lambda: slanted_bars(GRID, angle_deg=float("nan"), width=1, gap=1), "finite angle"),
+        (lambda: slanted_bars(GRID, angle_deg=30, width=0.5, gap=1), "slanted bars: expected width"),
+        (lambda: rings(GRID, row=2, col=float("inf"), width=1, gap=1), "finite row, col"),
+        (lambda: rings(GRID, row=2, col=2, width=1, gap=0), "rings: expected width"),
         (lambda: levels([[0.5, 2.0]]), "2.0"),
         (lambda: levels([[float("nan")]]), "nan"),
         (lambda: levels([1.0, 2.0]), "rows"),

@@ -50,7 +50,7 @@ WRONG = {
         "2: sequence.0.icon.fit: expected 'contain', 'cover' or 'stretch', got 'tight'"
     ),
     "sequence:\n  - texture:\n      wave: {lag_deg: 60, lvl: 1}": "3: sequence.0.texture.wave.lvl: unknown key",
-    "sequence:\n  - texture: {dwell_s: 1}": "2: sequence.0.texture: give exactly one of wave, bars, walking_bars",
+    "sequence:\n  - texture: {dwell_s: 1}": "2: sequence.0.texture: give exactly one of wave, bars, slanted_bars",
     "sequence:\n  - texture:\n      levels: [[1, 2]]": "3: sequence.0.texture.levels.0.1: expected a number <= 1.0",
     "tolerance: high\nsequence: [{pause_s: 1}]": (
         "1: tolerance: expected 'draft', 'normal', 'fine' or a number > 0 such as 1e-3, got 'high'"
