@@ -16,7 +16,7 @@ from ..equations.chain import Chain
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .parts import Amplifier, Coupling, Finite, Note, Part, Positive, Span, Surroundings
+from .parts import Amplifier, Coupling, Finite, Note, Positive, ProfilePart, Span, Surroundings
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
@@ -33,7 +33,7 @@ class _Places:
         self.at = {(one.row, one.col): one for one in actuators}
 
 
-class Device(Part):
+class Device(ProfilePart):
     """A grid of actuators, its chains, its drive and its amplifier.
 
     Each row is cut into chains of `chain_length` actuators, which must divide `cols`; the first actuator

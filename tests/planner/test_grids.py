@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 
 from chainsim import Device, Outcome, load_device
+from dotwave.as_built.study import AsBuiltStudy, verify_as_built
+from dotwave.errors import AppError
+from dotwave.playing.emulate import emulate
+from dotwave.studies.tradeoff import trade_frame
 from dotwave.verification import verify
-from drivers import write_plan
+from drivers import ControllerSpec, VirtualController, read_waveform, write_plan
+from drivers.protocol.outgoing import UnfitController, check_fit
 from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave
 from planner import DwellTooShort, FramePlan, plan_scene
+from planner.analysis.effects import Linearisation
 from planner.closed_forms import grid
 from tests.support.grid_motion import felt_after
 
@@ -166,6 +172,28 @@ def test_too_many_stages_for_one_drive_are_refused_with_what_lacks() -> None:
     assert frame.outcome is Outcome.UNREACHABLE
     assert "it lacks drives" in frame.note
     assert np.abs(frame.states[0].phasor) == pytest.approx(np.full(36, LINKED.full_scale))
+
+
+def test_what_is_for_chains_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "rest.npz"
+    scene = Scene(SHAPE, (Frame(TargetPattern(np.zeros((6, 6), dtype=np.complex128)), dwell_s=0.1),))
+    write_plan(plan_scene(scene, LINKED), path)
+    with pytest.raises(AppError, match="only chains are drawn"):
+        verify_as_built(path, AsBuiltStudy())
+    with pytest.raises(AppError, match="links along rows only"):
+        emulate(device="grid-6x6")
+    with pytest.raises(AppError, match="pareto: grid-6x6 is coupled in two dimensions"):
+        trade_frame("Hello", device="grid-6x6", frame=1, picture=None)
+    with pytest.raises(UnfitController, match="only files hold them"):
+        check_fit(read_waveform(path)[0], VirtualController(ControllerSpec.of(LINKED), now=0.0)._capabilities())
+
+
+def test_explain_counts_the_links_downwards() -> None:
+    frame = planned(WAVES, plane_wave(SHAPE, lag_deg=60, row_lag_deg=45))
+    about = Linearisation(WAVES.chain, frame.states[0])
+    standing = about.impedance(frame.states[0].omega, 0.75 * WAVES.beta * about.size**2) @ frame.states[0].phasor
+    assert standing == pytest.approx(about.driven(about.lines[0]), abs=1e-12)
+    assert np.abs(about.without_down()[0]).max() > 0.5 * WAVES.full_scale
 
 
 def test_a_pattern_changes_into_another_without_rest(tmp_path: Path) -> None:
