@@ -16,7 +16,7 @@ from dotwave.studies.tradeoff import trade_frame
 from dotwave.verification import verify
 from drivers import ControllerSpec, VirtualController, read_waveform, write_plan
 from drivers.protocol.outgoing import UnfitController, check_fit
-from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave
+from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, walking_bars
 from planner import DwellTooShort, FramePlan, plan_scene
 from planner.analysis.effects import Linearisation
 from planner.closed_forms import grid
@@ -68,7 +68,7 @@ def test_small_motions_pass_on_as_the_matrix_of_links_says() -> None:
     assert found.reshape(11, 36) == pytest.approx(np.linalg.inv(stage)[:, places].T, rel=1e-9)
 
 
-@pytest.mark.parametrize(("lag", "row_lag"), [(90, 90), (60, 45), (30, 150), (75, -80), (-20, 110), (0, 60)])
+@pytest.mark.parametrize(("lag", "row_lag"), [(90, 90), (60, 45), (30, 150), (75, -80), (-20, 110), (0, 60), (165, 4)])
 def test_a_wave_of_any_lags_is_planned(lag: float, row_lag: float) -> None:
     frame = planned(WAVES, plane_wave(SHAPE, lag_deg=lag, row_lag_deg=row_lag))
     assert frame.outcome is Outcome.OK, frame.note
@@ -111,6 +111,12 @@ def test_dots_under_one_lam_each_way_are_refused_with_the_nearest() -> None:
     assert "it lacks a lam per link" in frame.note
     # The driven edge of the nearest is as wished.
     assert np.abs(frame.states[0].phasor[:6]) / WAVES.full_scale == pytest.approx([1, 0, 1, 0, 1, 0], abs=1e-6)
+
+
+def test_walking_bars_are_refused() -> None:
+    frame = planned(WAVES, walking_bars(SHAPE, width=3))
+    assert frame.outcome is Outcome.UNREACHABLE
+    assert "it lacks separate rows" in frame.note
 
 
 def test_a_frame_too_short_for_its_way_in_says_how_long() -> None:
