@@ -120,6 +120,10 @@ class Device(ProfilePart):
 
     def _check_grid(self) -> None:
         """What a grid coupled in two dimensions must be, and cannot have."""
+        if min(self.rows, self.cols) < 2:
+            raise ValueError(
+                f"coupling.lam_y: a grid of {self.rows} x {self.cols} is no grid but a chain; remove lam_y"
+            )
         if self.chain_length != self.rows * self.cols:
             wanted = self.rows * self.cols
             raise ValueError(f"chain_length {self.chain_length}: with coupling.lam_y it is rows times cols, {wanted}")

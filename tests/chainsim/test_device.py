@@ -89,6 +89,7 @@ def test_a_file_of_ones_own(tmp_path):
         ({"coupling": GRID | {"closure": "ring"}}, "coupling", "is open, got ring"),
         ({"coupling": GRID | {"bits": 8}}, "coupling", "remove bits or lam_y"),
         ({"coupling": GRID}, "file", "it is rows times cols, 36"),
+        ({"coupling": GRID, "rows": 1}, "file", "no grid but a chain"),
         ({"coupling": GRID, "chain_length": 36, "bias": "actuator"}, "file", "takes bias none"),
         ({"coupling": GRID, "chain_length": 36, "spread": {"frequency": 0.01}}, "file", "remove spread"),
         ({"full_scale": 1.5}, "file", "hilltop"),
