@@ -190,6 +190,8 @@ class Device(ProfilePart):
 
     def lam_gain(self, row: int, index: int = 0) -> NDArray[np.float64]:
         """What the links of a chain make of the lam they are set to; float64, shape (n-1,), 1 where not measured."""
+        if self.grid:
+            return np.ones(self.links)
         return np.array(
             [
                 1.0 if one is None or one.lam is None or one.lam_set is None else one.lam / one.lam_set
