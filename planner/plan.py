@@ -64,6 +64,8 @@ class Ramp:
     tones : envelopes at other frequencies, which add to the drive.
     residue : float64, shape (2, 2n): how far the chain's positions and velocities (in tau) are at the end of the ramp
         from the motion it leads to, when it began at phase 0 of the carrier and at pi/2; None where that is not known.
+    left : largest deviation from the point it leads to that was found behind it, in units of full scale; 0 where none
+        was looked for.
     """
 
     t_s: Floats
@@ -76,6 +78,7 @@ class Ramp:
     lacking: str = ""
     tones: tuple[ToneRamp, ...] = ()
     residue: Floats | None = None
+    left: float = 0.0
 
     @cached_property
     def duration_s(self) -> float:

@@ -147,14 +147,15 @@ class _Frames:
 
     def _left(self, change: Change, start_s: float, settled_s: float, length_s: float) -> float:
         """What changes leave that is felt in a frame, in units of full scale."""
+        found = max((ramp.left for ramp in change.ramps if ramp is not None), default=0.0)
         if self._following is None:
             if not change.rings:
-                return 0.0
+                return found
             from .following import Following
 
             self._following = Following(self._device)
         moments = (self._device.tau_per_s * at_s for at_s in (start_s, settled_s, length_s - settled_s))
-        return self._following.through(change.states, change.ramps, *moments)
+        return max(found, self._following.through(change.states, change.ramps, *moments))
 
 
 def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, str]:

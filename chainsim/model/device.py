@@ -16,7 +16,7 @@ from ..equations.chain import Chain
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .parts import Amplifier, Coupling, Finite, Note, Part, Positive, Span, Surroundings
+from .parts import Amplifier, Coupling, Finite, Note, Positive, ProfilePart, Span, Surroundings
 
 __all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
 
@@ -33,7 +33,7 @@ class _Places:
         self.at = {(one.row, one.col): one for one in actuators}
 
 
-class Device(Part):
+class Device(ProfilePart):
     """A grid of actuators, its chains, its drive and its amplifier.
 
     Each row is cut into chains of `chain_length` actuators, which must divide `cols`; the first actuator
@@ -120,6 +120,10 @@ class Device(Part):
 
     def _check_grid(self) -> None:
         """What a grid coupled in two dimensions must be, and cannot have."""
+        if min(self.rows, self.cols) < 2:
+            raise ValueError(
+                f"coupling.lam_y: a grid of {self.rows} x {self.cols} is no grid but a chain; remove lam_y"
+            )
         if self.chain_length != self.rows * self.cols:
             wanted = self.rows * self.cols
             raise ValueError(f"chain_length {self.chain_length}: with coupling.lam_y it is rows times cols, {wanted}")
@@ -186,6 +190,8 @@ class Device(Part):
 
     def lam_gain(self, row: int, index: int = 0) -> NDArray[np.float64]:
         """What the links of a chain make of the lam they are set to; float64, shape (n-1,), 1 where not measured."""
+        if self.grid:
+            return np.ones(self.links)
         return np.array(
             [
                 1.0 if one is None or one.lam is None or one.lam_set is None else one.lam / one.lam_set

@@ -11,7 +11,16 @@ from ..equations.coupling import Closure, law_of
 from .calibrated import ActuatorSpread
 
 __all__ = [
-    "Amplifier", "Coupling", "Finite", "HigherMode", "NotNegative", "Note", "Part", "Positive", "Span", "Surroundings",
+    "Amplifier",
+    "Coupling",
+    "Finite",
+    "HigherMode",
+    "NotNegative",
+    "Note",
+    "Positive",
+    "ProfilePart",
+    "Span",
+    "Surroundings",
 ]  # fmt: skip
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -21,13 +30,13 @@ Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Bits = Annotated[int, Field(ge=1, le=32)]
 
 
-class Part(BaseModel):
+class ProfilePart(BaseModel):
     """A section of a profile: unknown keys are refused, nothing changes after reading."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
-class Span(Part):
+class Span(ProfilePart):
     """A closed range of what a device can set."""
 
     min: NotNegative
@@ -40,7 +49,7 @@ class Span(Part):
         return self
 
 
-class Coupling(Part):
+class Coupling(ProfilePart):
     """How actuators of a chain are coupled.
 
     `scope` is what one lam belongs to: every link has its own (`link`), one for a chain (`chain`), one
@@ -86,7 +95,7 @@ class Coupling(Part):
         return 0.0 if self.bits is None else (self.lam.max - self.lam.min) / (2**self.bits - 1)
 
 
-class Amplifier(Part):
+class Amplifier(ProfilePart):
     """What every output channel can do.
 
     With `bits`, its converter makes 2^bits - 1 voltages from -volts to volts, 0 among them; None is any.
@@ -103,14 +112,14 @@ class Amplifier(Part):
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
-class Note(Part):
+class Note(ProfilePart):
     """Where a value of the profile comes from."""
 
     assumed: bool
     why: Annotated[str, Field(min_length=1)]
 
 
-class HigherMode(Part):
+class HigherMode(ProfilePart):
     """A higher bending mode: `omega` its frequency over f0, `delta` its damping, `gain` its share of the force."""
 
     omega: Positive
@@ -118,7 +127,7 @@ class HigherMode(Part):
     gain: Finite
 
 
-class Surroundings(Part):
+class Surroundings(ProfilePart):
     """What acts on a device beside what its profile says; what is left out is not there.
 
     Attributes

@@ -95,7 +95,7 @@ def emulate(
     Raises
     ------
     AppError
-        When a number is out of range.
+        When a number is out of range, or the device is coupled in two dimensions.
     ChainError, DriverError
         When the profile, the plant, the port or the record cannot be made.
     """
@@ -104,6 +104,8 @@ def emulate(
             raise AppError(f"--{name}: expected 0.01 to 60 seconds, got {value}")
     out = out or sys.stderr
     profile = load_device(device)
+    if profile.grid:
+        raise AppError(f"emulate: a controller has links along rows only, {profile.name} also downwards; use verify")
     spec = ControllerSpec.of(profile, buffer_s=buffer_s, watchdog_s=watchdog_s, drift_ppm=drift_ppm)
     true = None if plant is None else read_plant(plant, profile)
     emulator = Emulator(profile, spec, link=link, faults=faults, seed=seed, record=record, plant=true)

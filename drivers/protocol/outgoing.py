@@ -95,7 +95,7 @@ def check_fit_for(device: Device, found: Capabilities, lam_max: float, *, parame
     if device.grid:
         raise UnfitController(
             f"controller {found.name!r}: its links go along rows, those of {device.name} also downwards; "
-            "play to a file (-o), which holds them"
+            "only files hold them (-o)"
         )
     if lam_max > 0 and not (found.lam_step > 0 and lam_max <= found.lam_max * (1 + 1e-6)):
         raise UnfitController(f"controller {found.name!r}: its lam ends at {found.lam_max:g}, {lam_max:g} is needed")

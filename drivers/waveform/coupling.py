@@ -129,7 +129,7 @@ class _RowPath:
         along = device.rows * (device.cols - 1)
 
         def rows(links: Floats) -> Floats:
-            right = links[:, :along].reshape(len(t_s), device.rows, -1)
+            right = links[:, :along].reshape(len(t_s), device.rows, device.cols - 1)
             down = links[:, along:].reshape(len(t_s), device.rows - 1, device.cols)
             return np.concatenate([right, np.pad(down, ((0, 0), (1, 0), (0, 0)))], axis=2)
 

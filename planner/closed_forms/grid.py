@@ -53,8 +53,8 @@ class GridLinks:
         """Of links in a row, as `flat` puts them."""
         right, down = np.zeros((device.rows, device.cols)), np.zeros((device.rows, device.cols))
         along = device.rows * (device.cols - 1)
-        right[:, 1:] = lam[:along].reshape(device.rows, -1)
-        down[1:] = lam[along:].reshape(-1, device.cols)
+        right[:, 1:] = lam[:along].reshape(device.rows, device.cols - 1)
+        down[1:] = lam[along:].reshape(device.rows - 1, device.cols)
         return cls(right, down)
 
     @property

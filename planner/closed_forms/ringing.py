@@ -1,4 +1,4 @@
-"""How small deviations of an open chain from the motion it is meant to do ring on: linear, and exact in time."""
+"""How small deviations of an open chain, or grid, from the motion it is meant to do ring on: linear, exact in time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def ringing(chain: Chain, lam: Floats, amplitude: Floats) -> Floats:
 
     Parameters
     ----------
-    lam : float64, shape (..., n-1).
+    lam : float64, shape (..., n-1); of a grid its links to the right, row by row, then those downwards.
     amplitude : float64, shape (..., n), of the motion, dimensionless.
 
     Returns
@@ -38,8 +38,11 @@ def ringing(chain: Chain, lam: Floats, amplitude: Floats) -> Floats:
     whole[..., at, n + at] = 1.0
     whole[..., n + at, n + at] = -np.asarray(chain.deltas)
     whole[..., n + at, at] = -(chain.stiffness + 1.5 * np.asarray(chain.betas) * amplitude**2)
-    whole[..., n + at[1:], at[1:]] -= lam
-    whole[..., n + at[1:], at[:-1]] = lam
+    along = chain.rows * (chain.cols - 1)
+    right = np.flatnonzero(at % chain.cols)
+    for fed, step, links in ((right, 1, lam[..., :along]), (at[chain.cols :], chain.cols, lam[..., along:])):
+        whole[..., n + fed, fed] -= links
+        whole[..., n + fed, fed - step] = links
     return whole
 
 

@@ -136,7 +136,15 @@ class GridRows(AmplitudeFamily):
             lam_t_s=lam_t_s,
             lam=self._links(right),
             lacking=next((way.lacking for way in moving if way.lacking), ""),
+            residue=self._residue(ways),
         )
+
+    def _residue(self, ways: Sequence[Ramp | None]) -> Floats | None:
+        """What the rows' ways leave, as one; None where one of them does not say it."""
+        n = self.device.cols
+        each = [np.zeros((2, 2 * n)) if way is None else way.residue for way in ways]
+        known = [one.reshape(2, 2, n) for one in each if one is not None]
+        return np.concatenate(known, axis=2).reshape(2, -1) if len(known) == len(each) else None
 
 
 def _union(nodes: Sequence[Floats]) -> Floats:

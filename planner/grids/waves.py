@@ -15,7 +15,7 @@ from ..family import RisingFamily
 from ..margins import lacking_of
 from ..operating_point import OperatingPoint
 from ..plan import AMPLITUDE_ERROR_LIMIT, Ramp
-from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
+from ..targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget
 from ..transitions.joining import as_tone
 from .point import margins_of, noise_of, point_tones, rest_of
 from .ways import enter_grid, leave_grid
@@ -30,6 +30,7 @@ Complexes = NDArray[np.complex128]
 WEAKER = 0.1
 # Lags nearer to 0 or pi than this carry nothing.
 LEAST_LAG = 1e-3
+WALKS_NOT = "bars walk along chains that stand alone, and its rows are coupled; it lacks separate rows"
 # Where any phases will do.
 FREE_LAG = math.pi / 2
 
@@ -71,6 +72,8 @@ class GridWaves(RisingFamily):
         margins = margins_of(device, epsilon, phasor, links, wave.omega)
         error = (wish.error(phasor) + noise_of(device, links)) / device.full_scale
         lacking = _lacking(device, wish, wave, error) or lacking_of(margins)
+        if isinstance(target, WalkingTarget):
+            lacking = WALKS_NOT
         return OperatingPoint(
             target=target.levels, epsilon=complex(epsilon[0]), lam=links.flat, omega=wave.omega, phasor=phasor.ravel(),
             bias=np.zeros(device.chain_length), mean=np.zeros(device.chain_length),
@@ -127,14 +130,27 @@ def _carries(lag: float) -> bool:
 
 
 def _links_for(device: Device, wish: _Wish) -> GridWave:
-    """The links of the wave: as strong as can be along the direction in which ways are quicker."""
+    """The links of the wave: strong along the direction in which ways are quicker, as long as they are to be had."""
     right, down = _carries(wish.lag_x), _carries(wish.lag_y) and device.coupling.drives == "border"
+    shares = [0.0] if down else [1.0]
     if right and down:
-        share = WEAKER if math.sin(wish.lag_y) <= math.sin(wish.lag_x) else 1 - WEAKER
-    else:
-        share = 0.0 if down else 1.0
+        shares = [WEAKER, 1 - WEAKER, 0.0, 1.0]
+        if math.sin(wish.lag_x) < math.sin(wish.lag_y):
+            shares = [1 - share for share in shares]
     lag_x = wish.lag_x if right or down else FREE_LAG
-    return plane_wave(device, wish.level, lag_x, wish.lag_y, share)
+    waves = [plane_wave(device, wish.level, lag_x, wish.lag_y, share) for share in shares]
+    return next((wave for wave in waves if not _out_of_range(device, wave)), waves[0])
+
+
+def _out_of_range(device: Device, wave: GridWave) -> str:
+    """One clause on the lam that cannot be had, "" when both can."""
+    for lam, span, name in (
+        (wave.lam_x, device.coupling.lam, "lam"),
+        (wave.lam_y, device.coupling.lam_y, "lam_y"),
+    ):
+        if span is not None and not span.min <= lam <= span.max:
+            return f"it takes a {name} of {lam:.3g}, beside {span.min:.3g}..{span.max:.3g}; it lacks range of {name}"
+    return ""
 
 
 def _lacking(device: Device, wish: _Wish, wave: GridWave, error: float) -> str:
@@ -152,9 +168,8 @@ def _lacking(device: Device, wish: _Wish, wave: GridWave, error: float) -> str:
         )
     if coupling.drives == "corner" or (coupling.drives == "column" and not right):
         return "only its corner or first column is driven; it lacks drives on the first row and column"
-    for lam, span, name in ((wave.lam_x, coupling.lam, "lam"), (wave.lam_y, coupling.lam_y, "lam_y")):
-        if span is not None and not span.min <= lam <= span.max:
-            return f"it takes a {name} of {lam:.3g}, beside {span.min:.3g}..{span.max:.3g}; it lacks range of {name}"
+    if beyond := _out_of_range(device, wave):
+        return beyond
     if not device.omega.min <= wave.omega <= device.omega.max:
         return f"it takes an omega of {wave.omega:.4g}; it lacks range of omega"
     if error > AMPLITUDE_ERROR_LIMIT:

@@ -69,9 +69,9 @@ def quickest(
     for length_s in lengths_s:
         ramp, lacking = way(length_s)
         if not lacking and rises:
-            error = _error_after(device, point, ramp)
-            if error > AMPLITUDE_ERROR_LIMIT / 2:
-                lacking = f"its way in leaves {100 * error:.2g} % of full scale ringing; it lacks time"
+            ramp = replace(ramp, left=_error_after(device, point, ramp))
+            if ramp.left > AMPLITUDE_ERROR_LIMIT / 2:
+                lacking = f"its way in leaves {100 * ramp.left:.2g} % of full scale ringing; it lacks time"
         if not lacking:
             return ramp
     return replace(ramp, lacking=lacking)

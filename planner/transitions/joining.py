@@ -108,6 +108,7 @@ def joined(first: Ramp, second: Ramp, before: OperatingPoint, after: OperatingPo
         lam_t_s=lam_t_s,
         lam=lam,
         lacking=first.lacking or second.lacking,
+        left=second.left,
         tones=_merged(tones),
     )
 

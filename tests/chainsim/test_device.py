@@ -11,6 +11,8 @@ from pydantic import ValidationError
 from chainsim import Closure, Device, ProfileError, assumed_of, device_names, load_device, surroundings_of
 from chainsim.model.calibrated import Actuator
 
+GRID = {"scope": "link", "lam_y": {"min": 0, "max": 1}, "drives": "corner"}
+
 
 def profile(**changes):
     data = load_device("linked-6x6").as_dict()
@@ -45,6 +47,16 @@ def test_the_five_of_the_design_are_there():
     assert load_device("linked-40x96").chains_per_row == 16
 
 
+def test_a_grid_is_one_chain_with_several_drives():
+    device = load_device("grid-6x6")
+    assert (device.grid, device.chains, device.chain.rows, device.chain.cols, device.links) == (True, 1, 6, 6, 60)
+    assert device.driven == (*((row, 0) for row in range(6)), *((0, col) for col in range(1, 6)))
+    coupled = {where: device.coupling.model_copy(update={"drives": where}) for where in ("corner", "column")}
+    assert [len(device.model_copy(update={"coupling": one}).driven) for one in coupled.values()] == [1, 6]
+    assert "lam_y" in device.as_dict()["coupling"]
+    assert "lam_y" not in load_device("linked-6x6").as_dict()["coupling"]
+
+
 def test_units():
     device = load_device("paper-6x6")
     assert device.tau_per_s == pytest.approx(2 * math.pi * 133.13)
@@ -70,6 +82,16 @@ def test_a_file_of_ones_own(tmp_path):
         ({"omega": {"min": 1.2, "max": 1.0}}, "omega", "swap them"),
         ({"colour": "red"}, "colour", "unknown key"),
         ({"chain_length": 4}, "file", "does not divide"),
+        ({"coupling": {"scope": "link", "lam_y": {"min": 0, "max": 1}}}, "coupling", "give both"),
+        ({"coupling": {"scope": "link", "drives": "corner"}}, "coupling", "give both"),
+        ({"coupling": {"scope": "link", "lam_y": {"min": 0, "max": 1}, "drives": "left"}}, "coupling.drives", "'left'"),
+        ({"coupling": GRID | {"scope": "device"}}, "coupling", "expected chain or link"),
+        ({"coupling": GRID | {"closure": "ring"}}, "coupling", "is open, got ring"),
+        ({"coupling": GRID | {"bits": 8}}, "coupling", "remove bits or lam_y"),
+        ({"coupling": GRID}, "file", "it is rows times cols, 36"),
+        ({"coupling": GRID, "rows": 1}, "file", "no grid but a chain"),
+        ({"coupling": GRID, "chain_length": 36, "bias": "actuator"}, "file", "takes bias none"),
+        ({"coupling": GRID, "chain_length": 36, "spread": {"frequency": 0.01}}, "file", "remove spread"),
         ({"full_scale": 1.5}, "file", "hilltop"),
         ({"notes": {"weight": {"assumed": True, "why": "?"}}}, "file", "no such field"),
     ],

@@ -1,4 +1,4 @@
-"""What a grid coupled in two dimensions does under a written waveform: the equations alone, by another integrator."""
+"""What a grid coupled in two dimensions does under a written waveform, by an integrator of its own."""
 
 from __future__ import annotations
 

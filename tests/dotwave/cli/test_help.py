@@ -39,7 +39,7 @@ def test_every_command_stands_in_one_group_of_the_help(dotwave) -> None:
 
 def test_devices_are_completed_without_being_read() -> None:
     assert completed_devices("") == device_names()
-    assert completed_devices("linked") == ["linked-40x96", "linked-6x6"]
+    assert completed_devices("linked") == ["linked-40x96", "linked-6x6", "linked-grid-6x6"]
 
 
 def test_files_are_completed_by_their_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
