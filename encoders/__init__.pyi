@@ -26,6 +26,7 @@ from .braille.louis_binding import (
 )
 from .braille.presentation import (
     read_cells as read_cells,
+    read_page as read_page,
 )
 from .braille.readers.brf import (
     brf_to_cells as brf_to_cells,
@@ -156,4 +157,17 @@ from .textures import (
     plane_wave as plane_wave,
     regions as regions,
     walking_bars as walking_bars,
+)
+from .travel import (
+    SMOOTHNESS as SMOOTHNESS,
+    STANDS_FROM as STANDS_FROM,
+    Direction as Direction,
+    TravelFrames as TravelFrames,
+    arrow as arrow,
+    circle as circle,
+    crossing as crossing,
+    levels_at as levels_at,
+    moving_dot as moving_dot,
+    path as path,
+    scrolled_bars as scrolled_bars,
 )

@@ -138,6 +138,9 @@ class Frame:
     goes_on : where words go on after a run of the page.
     headings : of the source, that begin on the page; of its parts the first has them.
     number : which of the cells show the page's number; None where none do.
+    travels : its levels come from those of the frame before on a smooth way that takes the whole frame
+        (`encoders.levels_at`), and the pattern is not held; else they are to stand as soon as can be.
+    leads : it stands, and what travels follows it.
     """
 
     pattern: TargetPattern
@@ -149,6 +152,8 @@ class Frame:
     goes_on: tuple[GoesOn, ...] = ()
     headings: tuple[Heading, ...] = ()
     number: PageNumber | None = None
+    travels: bool = False
+    leads: bool = False
 
 
 @dataclass(frozen=True, repr=False)

@@ -36,6 +36,7 @@ from .drive import (
     tones_of as tones_of,
 )
 from .errors import (
+    CannotTravel as CannotTravel,
     ContrastError as ContrastError,
     DwellTooShort as DwellTooShort,
     PlanError as PlanError,

@@ -114,22 +114,23 @@ def text(
 def texture(
     kind: Mapping[str, Any] | TargetPattern, device: AnyDevice = USUAL_DEVICE, *, dwell_s: float = 2.0
 ) -> Scene:
-    """One pattern: a wave, bars, walking bars, levels, or regions of them.
+    """A wave, bars, walking bars, levels, or regions of them; text or bars that scroll, or a dot that moves.
 
     Parameters
     ----------
     kind : mapping or encoders.TargetPattern
         As the key `texture` of a job file: ``{"wave": {"lag_deg": 60}}``, ``{"bars": {"width": 1, "gap": 1}}``,
-        ``{"walking_bars": {"rate_hz": 3}}``, ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row).
+        ``{"walking_bars": {"rate_hz": 3}}``, ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row),
+        ``{"scroll": {"text": "Hello", "columns_per_s": 3}}``, ``{"dot": {"arrow": "right", "actuators_per_s": 3}}``.
     device : Device, name, file or mapping
         Whose grid it covers.
     dwell_s : float
-        Seconds it is felt.
+        Seconds it is felt; a text that scrolls takes as long as it is.
 
     Returns
     -------
     encoders.Scene
-        Of one frame.
+        Of one frame; of what moves one for each place it passes (`encoders.levels_at` says what is between).
 
     Raises
     ------
@@ -147,7 +148,7 @@ def texture(
     from ..jobs.texture import TexturePart
 
     part = _checked(TexturePart, dict(kind) | {"dwell_s": dwell_s}, "texture")
-    return still_scene(part.target(shape_of(_device(device))), part.dwell_s, f"texture: {part.kind}")
+    return part.scene(shape_of(_device(device)))
 
 
 def job(path: str | PathLike[str]) -> DeviceScene:

@@ -191,7 +191,11 @@ class Vibration(AmplitudeFamily):
         return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """From rest and to rest along the flat output; between patterns with links that vary in time."""
         chain, band = self.device.chain, self.band
@@ -212,9 +216,9 @@ class Vibration(AmplitudeFamily):
                 for i, ramp in zip(index, ramps, strict=True):
                     out[i] = ramp
 
-        fill(resting & ~stopping, rise, band.rise_s, new)
-        fill(stopping & ~resting, fall, band.ramp_s, old)
-        fill(~resting & ~stopping, change, band.ramp_s, old, new)
+        fill(resting & ~stopping, rise, length_s or band.rise_s, new)
+        fill(stopping & ~resting, fall, length_s or band.ramp_s, old)
+        fill(~resting & ~stopping, change, length_s or band.ramp_s, old, new)
         return self._known(before, after, out)
 
     def _known(

@@ -211,7 +211,7 @@ def _job(path: Path) -> None:
         if item.texture is not None:
             # Whoever renders a job says which of its items does not fit the grid.
             with contextlib.suppress(TextureError):
-                item.texture.target(SHAPE)
+                next(iter(item.texture.scene(SHAPE).frames))
 
 
 def _sweep(path: Path) -> None:
