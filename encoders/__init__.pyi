@@ -130,6 +130,8 @@ from .picture.similarity import (
     similarities as similarities,
 )
 from .scene import (
+    SMOOTHNESS as SMOOTHNESS,
+    STANDS_FROM as STANDS_FROM,
     Frame as Frame,
     GoesOn as GoesOn,
     GridShape as GridShape,
@@ -159,8 +161,6 @@ from .textures import (
     walking_bars as walking_bars,
 )
 from .travel import (
-    SMOOTHNESS as SMOOTHNESS,
-    STANDS_FROM as STANDS_FROM,
     Direction as Direction,
     TravelFrames as TravelFrames,
     arrow as arrow,

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "SMOOTHNESS",
+    "STANDS_FROM",
     "Frame",
     "GoesOn",
     "GridShape",
@@ -22,6 +24,12 @@ __all__ = [
     "TargetPattern",
     "WalkingBars",
 ]
+
+
+SMOOTHNESS = 9
+"""Derivatives of a level that vanish where what travels passes a place: as many as links need that change with it."""
+STANDS_FROM = 0.8
+"""From this share of its way on a pattern is within 0.2 % of where it goes; as long it is so after it."""
 
 
 @dataclass(frozen=True)

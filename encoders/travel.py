@@ -15,21 +15,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .scene import Frame, GridShape, Scene, TargetPattern
+from .scene import SMOOTHNESS, Frame, GridShape, Scene, TargetPattern
 from .textures import TextureError, bars
 
 __all__ = [
-    "SMOOTHNESS", "STANDS_FROM", "Direction", "TravelFrames", "arrow", "circle", "crossing", "levels_at", "moving_dot",
+    "Direction", "TravelFrames", "arrow", "circle", "crossing", "levels_at", "moving_dot",
     "path", "scrolled_bars",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
 Place = tuple[int, int]
 
-SMOOTHNESS = 9
-"""Derivatives of a level that vanish where a pattern is passed: as many as links need that change with it."""
-STANDS_FROM = 0.8
-"""From this share of its way on a pattern is within 0.2 % of where it goes; as long it is so after it."""
 LEAD_S = 0.6
 """How long the first pattern stands before it begins to travel."""
 SLOWEST, QUICKEST = 0.1, 100.0

@@ -113,6 +113,9 @@ from .scene_plan import (
     kept_share as kept_share,
     plan_scene as plan_scene,
 )
+from .travel import (
+    quickest_travel as quickest_travel,
+)
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
 )

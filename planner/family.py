@@ -83,6 +83,11 @@ class AmplitudeFamily(PatternFamily):
     def ramp_s(self) -> float:
         """Longest ramp in seconds."""
 
+    @property
+    def shortest_s(self) -> float:
+        """Shortest way in seconds from one pattern to the next where patterns travel."""
+        return self.ramp_s
+
     @abstractmethod
     def states(self, targets: Floats) -> list[OperatingPoint]:
         """The points for amplitudes `targets`, float64, shape (P, n), in units of full scale."""

@@ -135,11 +135,12 @@ class _Frames:
             raise CannotTravel(cannot_travel(self._device))
         if not frame.travels:
             return Pace(awake=True)
-        if length_s < family.ramp_s:
+        if length_s < family.shortest_s:
+            most = math.floor(100 / family.shortest_s) / 100
             raise DwellTooShort(
-                f"patterns that travel by {1 / length_s:.3g} a second are too quick for {self._device.name}, which "
-                f"takes {family.ramp_s:.3g} s from one to the next; let at most {1 / family.ramp_s:.3g} columns or "
-                "places pass in a second (--rate in cells, in a job columns_per_s or actuators_per_s)"
+                f"{self._device.name} does not pass {1 / length_s:.3g} columns or places in a second: it takes "
+                f"{family.shortest_s:.3g} s from one to the next; let at most {most:g} pass in a second (--rate in "
+                "cells, in a job columns_per_s or actuators_per_s)"
             )
         return Pace(length_s, awake=True)
 
@@ -157,7 +158,7 @@ class _Frames:
         # After the way out nothing is to be felt any more.
         settled_s = length_s - 1 / self._device.f0_hz if travels else longest
         residue = 0.0 if frame is None else self._left(change, start_s, settled_s, length_s)
-        outcome, note = verdict(change, residue, self.means.memory)
+        outcome, note = verdict(change, residue, self.means.memory, travels)
         whole = FramePlan(
             frame, *times, change.states, change.ramps, outcome, note, contrast_db=self._asked_db, residue=residue
         )
@@ -179,7 +180,7 @@ class _Frames:
         return self._following.through(change.states, change.ramps, *moments)
 
 
-def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, str]:
+def verdict(change: Change, residue: float, memory: Memory, travels: bool = False) -> tuple[Outcome, str]:
     """What comes of a change that leaves `residue`, of full scale, and a sentence where that is not ok."""
     if change.made and residue <= AMPLITUDE_ERROR_LIMIT:
         return Outcome.OK, ""
@@ -189,10 +190,11 @@ def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, st
     cannot = f"{memory.device.name} cannot change to this pattern"
     if change.lacking:
         return Outcome.UNREACHABLE, f"{cannot}: {change.lacking}."
+    longer = "" if travels else "for longer (--dwell, in a job dwell_s), or "
     note = (
         f"{cannot}: what changes leave rings on at "
         f"{100 * residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
-        "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+        f"show frames {longer}with flat dots among those that are raised."
     )
     return Outcome.UNREACHABLE, note
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +14,8 @@ from ..scene import Frame, GridShape, TargetPattern
 from ..travel import LEAD_S, QUICKEST, SLOWEST
 from .dots import BLANK
 from .layout import Layout
-from .text import TextFrames
 
-__all__ = ["ScrollFrames", "scroll_layout"]
+__all__ = ["scroll_layout", "scrolled"]
 
 LINE_CELLS = 40
 """Cells that are laid out together; a word is cut only where it is longer."""
@@ -47,37 +46,40 @@ def scroll_layout(shape: GridShape, height: int, options: TextOptions) -> Layout
     return Layout(GridShape(height, LINE_CELLS * (2 + gap) - gap), height, gap)
 
 
-class ScrollFrames(TextFrames):
-    """The frames of a text that scrolls in the uppermost rows of the grid.
+def scrolled(lines: Iterable[Frame], layout: Layout, shape: GridShape, rate: float | None) -> Iterator[Frame]:
+    """The frames of lines that scroll in the uppermost rows of a grid.
 
-    The first is blank and stands; then comes one for every column of the line. A line ends with a blank cell. The text
-    enters at the right edge and leaves at the left, so that all of it passes every column of the grid.
+    The first is blank and stands; then comes one for every column of the lines, each of which ends with a blank cell.
+    The text enters at the right edge and leaves at the left, so that all of it passes every column of the grid.
+
+    Parameters
+    ----------
+    lines : one frame each, as `scroll_layout` lays them out.
+    rate : cells that pass in a second; None: `SCROLL_RATE`.
     """
+    step_s = 1 / ((2 + layout.cell_gap) * (rate or SCROLL_RATE))
+    window = np.zeros((shape.rows, shape.cols), dtype=np.complex128)
+    line: Frame | None = None
+    for page in lines:
+        if line is None:
+            yield replace(page, pattern=_seen(window), dwell_s=LEAD_S, headings=(), leads=True)
+        line = page
+        for column in _columns(page, layout, shape):
+            yield replace(line, pattern=_entered(window, column), dwell_s=step_s, travels=True)
+            # The first frame has the headings.
+            line = replace(line, headings=())
+    if line is not None:
+        for _ in range(shape.cols):
+            yield replace(line, pattern=_entered(window, 0.0), dwell_s=step_s, travels=True)
 
-    def _encoded(self) -> Iterator[Frame]:
-        step = 2 + self.layout.cell_gap
-        step_s = 1 / (step * (self.options.rate or SCROLL_RATE))
-        window = np.zeros((self.shape.rows, self.shape.cols), dtype=np.complex128)
-        line: Frame | None = None
-        for page in super()._encoded():
-            if line is None:
-                yield replace(page, pattern=_seen(window), dwell_s=LEAD_S, headings=(), leads=True)
-            line = page
-            for column in self._columns(page):
-                yield replace(line, pattern=_entered(window, column), dwell_s=step_s, travels=True)
-                # The first frame has the headings.
-                line = replace(line, headings=())
-        if line is not None:
-            for _ in range(self.shape.cols):
-                yield replace(line, pattern=_entered(window, 0.0), dwell_s=step_s, travels=True)
 
-    def _columns(self, page: Frame) -> NDArray[np.complex128]:
-        """The columns of a line and of the blank cell behind it, as rows of the grid."""
-        count = (2 + self.layout.cell_gap) * (len(page.cells.rstrip(BLANK)) + 1)
-        strip = np.zeros((count, self.shape.rows), dtype=np.complex128)
-        held = page.pattern.amplitude.T[:count]
-        strip[: len(held), : self.layout.height] = held
-        return strip
+def _columns(page: Frame, layout: Layout, shape: GridShape) -> NDArray[np.complex128]:
+    """The columns of a line and of the blank cell behind it, as rows; each as high as the grid."""
+    count = (2 + layout.cell_gap) * (len(page.cells.rstrip(BLANK)) + 1)
+    strip = np.zeros((count, shape.rows), dtype=np.complex128)
+    held = page.pattern.amplitude.T[:count]
+    strip[: len(held), : layout.height] = held
+    return strip
 
 
 def _entered(window: NDArray[np.complex128], column: NDArray[np.complex128] | float) -> TargetPattern:

@@ -94,12 +94,12 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
 def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> TextFrames:
     tables = resolve_tables(options.table)
     dots = _dots(source, tables, shape, options)
-    height, kind = 3 if dots == 6 else 4, TextFrames
+    height = 3 if dots == 6 else 4
     if options.presentation is Presentation.SCROLL:
         # Imported here: pages that stand do without.
-        from .scroll import ScrollFrames, scroll_layout
+        from .scroll import scroll_layout
 
-        layout, kind = scroll_layout(shape, height, options), ScrollFrames
+        layout = scroll_layout(shape, height, options)
     else:
         layout = Layout(shape, height, options.cell_gap, options.line_gap)
     transcriber = Transcriber(tables, options.undefined, dots, passages=layout.run < layout.capacity)
@@ -137,7 +137,7 @@ def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> Te
         encoding["page_numbers"] = options.page_numbers.value
     if source.emphases:
         encoding["emphases"] = [list(one) for one in source.emphases]
-    return kind(source, transcriber, layout, options, encoding, shape)
+    return TextFrames(source, transcriber, layout, options, encoding, shape)
 
 
 def _by_lines(source: TextSource, options: TextOptions, layout: Layout) -> bool:
@@ -215,13 +215,20 @@ class TextFrames:
             return
         kept: list[Frame] | None = []
         most = MOST_KEPT // (self.layout.shape.rows * self.layout.shape.cols)
-        for number, frame in enumerate(self._encoded(), 1):
+        for number, frame in enumerate(self._moved(), 1):
             if number > most:
                 kept = None
             if kept is not None:
                 kept.append(frame)
             yield frame
         self._kept = None if kept is None else tuple(kept)
+
+    def _moved(self) -> Iterator[Frame]:
+        if self.options.presentation is not Presentation.SCROLL:
+            return self._encoded()
+        from .scroll import scrolled
+
+        return scrolled(self._encoded(), self.layout, self.shape, self.options.rate)
 
     def _encoded(self) -> Iterator[Frame]:
         self._log = log = ReportLog()
