@@ -161,7 +161,7 @@ from .textures import (
     walking_bars as walking_bars,
 )
 from .travel import (
-    Direction as Direction,
+    ArrowDirection as ArrowDirection,
     TravelFrames as TravelFrames,
     arrow as arrow,
     circle as circle,

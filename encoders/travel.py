@@ -19,7 +19,7 @@ from .scene import SMOOTHNESS, Frame, GridShape, Scene, TargetPattern
 from .textures import TextureError, bars
 
 __all__ = [
-    "Direction", "TravelFrames", "arrow", "circle", "crossing", "levels_at", "moving_dot",
+    "ArrowDirection", "TravelFrames", "arrow", "circle", "crossing", "levels_at", "moving_dot",
     "path", "scrolled_bars",
 ]  # fmt: skip
 
@@ -32,7 +32,7 @@ SLOWEST, QUICKEST = 0.1, 100.0
 """Patterns in a second that can be asked for; what a device can do is less."""
 
 
-class Direction(StrEnum):
+class ArrowDirection(StrEnum):
     """Where an arrow leads."""
 
     RIGHT = "right"
@@ -164,11 +164,11 @@ def path(shape: GridShape, corners: Sequence[Place]) -> list[Place]:
     return found
 
 
-def arrow(shape: GridShape, direction: Direction) -> list[Place]:
+def arrow(shape: GridShape, direction: ArrowDirection) -> list[Place]:
     """The actuators through the middle of the grid from edge to edge."""
-    along = direction in (Direction.RIGHT, Direction.LEFT)
+    along = direction in (ArrowDirection.RIGHT, ArrowDirection.LEFT)
     middle, length = ((shape.rows - 1) // 2, shape.cols) if along else ((shape.cols - 1) // 2, shape.rows)
-    places = range(length) if direction in (Direction.RIGHT, Direction.DOWN) else range(length - 1, -1, -1)
+    places = range(length) if direction in (ArrowDirection.RIGHT, ArrowDirection.DOWN) else range(length - 1, -1, -1)
     return [(middle, place) if along else (place, middle) for place in places]
 
 

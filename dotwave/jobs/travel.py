@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from encoders import (
-    Direction,
+    ArrowDirection,
     GridShape,
     Presentation,
     Scene,
@@ -80,7 +80,7 @@ class DotPart(Part):
 
     circle: CirclePart | None = None
     path: Annotated[tuple[tuple[Place, Place], ...], Field(min_length=2)] | None = None
-    arrow: Direction | None = None
+    arrow: ArrowDirection | None = None
     closed: bool = False
     actuators_per_s: Speed
 

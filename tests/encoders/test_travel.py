@@ -11,7 +11,7 @@ from scipy.special import betainc
 from encoders import (
     SMOOTHNESS,
     STANDS_FROM,
-    Direction,
+    ArrowDirection,
     EncodeError,
     Frame,
     GridShape,
@@ -163,13 +163,13 @@ def test_a_path_goes_from_neighbour_to_neighbour() -> None:
     ("direction", "step"), [("right", (0, 1)), ("left", (0, -1)), ("down", (1, 0)), ("up", (-1, 0))]
 )
 def test_an_arrow_goes_where_it_says(direction: str, step: tuple[int, int]) -> None:
-    places = arrow(GRID, Direction(direction))
+    places = arrow(GRID, ArrowDirection(direction))
     assert len(places) == 6
     assert {(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places)} == {step}
 
 
 def test_an_open_way_goes_out_before_it_begins_anew() -> None:
-    frames = list(moving_dot(GRID, arrow(GRID, Direction.RIGHT), per_s=6.0, lasting_s=2.0))
+    frames = list(moving_dot(GRID, arrow(GRID, ArrowDirection.RIGHT), per_s=6.0, lasting_s=2.0))
     assert [int(raised(frame).sum()) for frame in frames] == [1, 1, 1, 1, 1, 1, 0, 1, 1, 1, 1, 1, 1]
 
 

@@ -120,7 +120,7 @@ def test_slow_walking_bars_name_the_nearest_rate_and_what_does_it() -> None:
     (there, *_) = targets_of(walking_bars(GRID, rate_hz=0.673), PAPER)
     assert walking_state(PAPER, there).outcome is Outcome.OK  # type: ignore[arg-type]
     # Bars six columns apart at 0.1 Hz.
-    plans = planned(scrolled_bars(GRID, width=3, gap=3, columns_per_s=0.6, lasting_s=10.0), "paper-6x6")
+    plans = planned(scrolled_bars(GRID, width=3, gap=3, columns_per_s=0.6, lasting_s=12.0), "paper-6x6")
     assert all(plan.outcome is Outcome.OK for plan in plans)
     assert plans[7].start_s - plans[1].start_s == pytest.approx(10.0, rel=1e-3)
     np.testing.assert_array_equal(plans[7].states[0].target, plans[1].states[0].target)
