@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,8 +37,8 @@ from encoders import (
 GRID = GridShape(6, 6)
 
 
-def scrolled(text: str, shape: GridShape = GRID, **options: object) -> list[Frame]:
-    return list(encode_text(text, shape, TextOptions(presentation=Presentation.SCROLL, **options)).frames)  # type: ignore[arg-type]
+def scrolled(text: str, shape: GridShape = GRID, **options: Any) -> list[Frame]:
+    return list(encode_text(text, shape, TextOptions(presentation=Presentation.SCROLL, **options)).frames)
 
 
 def raised(frame: Frame) -> np.ndarray:
@@ -120,7 +121,7 @@ def test_the_rate_is_in_cells() -> None:
         ({"page_numbers": PageNumbering.CORNER}, "page-numbers: a text that scrolls has no pages"),
     ],
 )
-def test_what_a_scroll_has_not_is_refused(options: dict[str, object], said: str) -> None:
+def test_what_a_scroll_has_not_is_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises(LayoutError, match=said):
         scrolled("Hi", **options)
 
