@@ -16,7 +16,7 @@ from dotwave.jobs.job import read_job
 from dotwave.jobs.scene import read_job_scene
 from dotwave.rendering import presenting
 from dotwave.request import Request
-from encoders import EncodeError, TextureError
+from encoders import EncodeError, Frame, TextureError
 
 
 def job(tmp_path: Path, texture: str) -> Path:
@@ -25,7 +25,7 @@ def job(tmp_path: Path, texture: str) -> Path:
     return path
 
 
-def raised(frame: dw.Frame) -> list[tuple[int, int]]:
+def raised(frame: Frame) -> list[tuple[int, int]]:
     return [(int(row), int(col)) for row, col in np.argwhere(np.abs(frame.pattern.amplitude) > 0.5)]
 
 
