@@ -7,17 +7,29 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
-from encoders import FeltPage, back_check, covered_emphases, covered_text, emphases_of, emphases_within, read_cells
+from encoders import (
+    FeltPage,
+    Presentation,
+    back_check,
+    covered_emphases,
+    covered_text,
+    emphases_of,
+    emphases_within,
+    read_page,
+)
 
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
+
+if TYPE_CHECKING:
+    from .passing import PassingFit
 
 __all__ = ["forces_under", "frequencies", "verify"]
 
@@ -35,13 +47,15 @@ class _Felt(NamedTuple):
     frequency, or the sum of those at all its tones; where nothing is to move without a bias, the amplitude of all that
     does.
     `still` and `moving` are both of them. `error` is the deviation from the target: of the complex amplitude where
-    phases are wanted, of the worst tone where there are several.
+    phases are wanted, of the worst tone where there are several. `way` is the largest deviation from the way of what
+    travels, else None.
     """
 
     level: Floats
     still: Floats
     moving: Floats
     error: Floats
+    way: float | None = None
 
 
 def verify(path: Path) -> VerifyReport:
@@ -87,7 +101,10 @@ class _Integration:
         self.block = max(256, BLOCK_VALUES // (device.rows * device.cols))
         self._built = AsBuilt(device)
         self._grid = self._built.integrator(manifest.rate_hz)
-        self._fits = [_Fit(device, mark, manifest.rate_hz) for mark in manifest.frames]
+        self._fits = [
+            _Fit(device, mark, manifest.rate_hz, _passing(manifest, number))
+            for number, mark in enumerate(manifest.frames)
+        ]
         self._first = 0
         self.position = 0
 
@@ -100,7 +117,7 @@ class _Integration:
         lam = manifest.lam_at(times_s) * self._built.lam_gain
         z = self._grid.advance(force, lam, manifest.lam_y_at(times_s))
         for fit in self._fits[self._first :]:
-            if fit.first > index[-1]:
+            if fit.begin > index[-1]:
                 break
             fit.take(index, z)
         while self._first < len(self._fits) and self._fits[self._first].stop <= index[-1] + 1:
@@ -120,6 +137,16 @@ class _Integration:
                 f"The actuator in row {gone.row}, column {gone.col} left its softening well at "
                 f"{gone.sample / self._manifest.rate_hz:.3f} s; its chain counts as not felt from there on."
             )
+
+
+def _passing(manifest: Manifest, number: int) -> PassingFit | None:
+    """What looks at the way of a frame that travels; None for one that does not, or has none before it."""
+    mark = manifest.frames[number]
+    if not mark.smoothness or not number:
+        return None
+    from .passing import PassingFit
+
+    return PassingFit(manifest.device, manifest.frames[number - 1], mark, manifest.rate_hz)
 
 
 def forces_under(volts: Floats, manifest: Manifest, built: AsBuilt) -> Floats:
@@ -146,9 +173,10 @@ def forces_under(volts: Floats, manifest: Manifest, built: AsBuilt) -> Floats:
 class _Fit:
     """Least squares of 1 and of cos and sin at each row's frequencies over the samples of one frame."""
 
-    def __init__(self, device: Device, mark: FrameMark, rate_hz: int) -> None:
-        self._device, self._mark, self._rate_hz = device, mark, rate_hz
+    def __init__(self, device: Device, mark: FrameMark, rate_hz: int, passing: PassingFit | None) -> None:
+        self._device, self._mark, self._rate_hz, self._passing = device, mark, rate_hz, passing
         self.first = round(mark.settled_s * rate_hz)
+        self.begin = self.first if passing is None else round(mark.start_s * rate_hz)
         self.stop = round(mark.end_s * rate_hz)
         self._rates = [frequencies(omega, tones) for omega, tones in zip(mark.omega, mark.tones, strict=True)]
         sizes = [1 + 2 * len(rates) for rates in self._rates]
@@ -158,6 +186,8 @@ class _Fit:
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
+        if self._passing is not None:
+            self._passing.take(index, z)
         inside = slice(*np.searchsorted(index, [self.first, self.stop]))
         tau = index[inside] / self._rate_hz * self._device.tau_per_s
         for row, rates in enumerate(self._rates):
@@ -192,7 +222,8 @@ class _Fit:
         # Without a bias nothing but a motion can be felt of a row that is to stand still.
         level = np.where((standing & (self._device.bias == "actuator"))[:, np.newaxis], still, moving)
         worst[standing] = np.abs(level - mark.target)[standing]
-        return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
+        way = None if self._passing is None else self._passing.error()
+        return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)), way)
 
     def _out_of_phase(self, phasor: Complexes) -> Floats:
         """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""
@@ -225,7 +256,8 @@ def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
         felt=felt.level,
         wrong_dots=int(verdict.wrong_dots),
         contrast_db=None if verdict.contrast_db is None else float(verdict.contrast_db),
-        amplitude_error=float(np.max(felt.error)),
+        amplitude_error=max(float(np.max(felt.error)), felt.way or 0.0),
+        way_error=felt.way,
         wanted_cells=mark.cells,
         text=mark.text,
     )
@@ -234,13 +266,14 @@ def _check(mark: FrameMark, felt: _Felt) -> FrameCheck:
 def _with_text(report: VerifyReport, manifest: Manifest) -> VerifyReport:
     """Read the felt dots of each page as cells, and translate them back."""
     encoding = manifest.encoding
-    emphases = emphases_of(encoding)
+    emphases, scrolls = emphases_of(encoding), encoding.get("presentation") == Presentation.SCROLL
     checks: list[FrameCheck] = []
     pages: list[FeltPage] = []
     marks = {mark.page: mark for mark in manifest.frames}
     for number, parts in groupby(report.frames, key=lambda check: check.page):
         together = list(parts)
-        cells = read_cells(np.any([check.felt_dots for check in together], axis=0), encoding)
+        dots = [check.felt_dots for check in together if not scrolls or check.way_error is not None]
+        cells = read_page(dots, encoding)
         mark = marks[number]
         pages.append(FeltPage(cells, mark.text, mark.goes_on, emphases_within(emphases, *mark.span), mark.number))
         checks += [replace(check, felt_cells=cells) for check in together]

@@ -26,6 +26,7 @@ from .braille.louis_binding import (
 )
 from .braille.presentation import (
     read_cells as read_cells,
+    read_page as read_page,
 )
 from .braille.readers.brf import (
     brf_to_cells as brf_to_cells,
@@ -129,6 +130,8 @@ from .picture.similarity import (
     similarities as similarities,
 )
 from .scene import (
+    SMOOTHNESS as SMOOTHNESS,
+    STANDS_FROM as STANDS_FROM,
     Frame as Frame,
     GoesOn as GoesOn,
     GridShape as GridShape,
@@ -158,4 +161,15 @@ from .textures import (
     rings as rings,
     slanted_bars as slanted_bars,
     walking_bars as walking_bars,
+)
+from .travel import (
+    ArrowDirection as ArrowDirection,
+    TravelFrames as TravelFrames,
+    arrow as arrow,
+    circle as circle,
+    crossing as crossing,
+    levels_at as levels_at,
+    moving_dot as moving_dot,
+    path as path,
+    scrolled_bars as scrolled_bars,
 )

@@ -32,12 +32,14 @@ class Presentation(StrEnum):
     """Order in which the dots of a page are shown.
 
     ``together``: all at once. ``by-row``: one row of the grid after another, from the top. ``by-dot``: in
-    all cells dot 1, then dot 2, and so on. Parts without a dot are left out.
+    all cells dot 1, then dot 2, and so on. Parts without a dot are left out. ``scroll``: the text moves to the left
+    in one line, column by column, under a finger that is still.
     """
 
     TOGETHER = "together"
     BY_ROW = "by-row"
     BY_DOT = "by-dot"
+    SCROLL = "scroll"
 
 
 class EmphasisChoice(StrEnum):
@@ -99,7 +101,9 @@ class TextOptions:
         less, (cells it has room for) / rate. None means 6: 1 s for 3 x 2 cells.
     dwell_s : seconds a page lasts, instead of `rate`. Shown in parts, a page gives each part an equal share,
         but at least 0.6 s; it then lasts longer.
-    presentation : dots together, by row, or by dot. None: together, and whoever plans it may take another.
+    presentation : dots together, by row, or by dot, or a text that scrolls. None: together, and whoever plans it may
+        take another. A text that scrolls has a rate (None means 1 cell in a second), no `dwell_s` and no page numbers,
+        and at least one free column between cells.
     blank_between : a blank frame between paragraphs.
     dots : 6, 8, or None: 8 for an 8-dot table on a grid whose rows make cells of four, else 6.
     emphasis : whether emphasis of documents is written; None for lines of 12 cells or more.

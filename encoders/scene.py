@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "SMOOTHNESS",
+    "STANDS_FROM",
     "Frame",
     "GoesOn",
     "GridShape",
@@ -22,6 +24,12 @@ __all__ = [
     "TargetPattern",
     "WalkingBars",
 ]
+
+
+SMOOTHNESS = 9
+"""Derivatives of a level that vanish where what travels passes a place: as many as links need that change with it."""
+STANDS_FROM = 0.8
+"""From this share of its way on a pattern is within 0.2 % of where it goes; as long it is so after it."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +146,9 @@ class Frame:
     goes_on : where words go on after a run of the page.
     headings : of the source, that begin on the page; of its parts the first has them.
     number : which of the cells show the page's number; None where none do.
+    travels : its levels come from those of the frame before on a smooth way that takes the whole frame
+        (`encoders.levels_at`), and the pattern is not held; else they are to stand as soon as can be.
+    leads : it stands, and what travels follows it.
     """
 
     pattern: TargetPattern
@@ -149,6 +160,8 @@ class Frame:
     goes_on: tuple[GoesOn, ...] = ()
     headings: tuple[Heading, ...] = ()
     number: PageNumber | None = None
+    travels: bool = False
+    leads: bool = False
 
 
 @dataclass(frozen=True, repr=False)

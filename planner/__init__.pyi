@@ -36,6 +36,7 @@ from .drive import (
     tones_of as tones_of,
 )
 from .errors import (
+    CannotTravel as CannotTravel,
     ContrastError as ContrastError,
     DwellTooShort as DwellTooShort,
     PlanError as PlanError,
@@ -111,6 +112,9 @@ from .scene_plan import (
     DEFAULT_CONTRAST_DB as DEFAULT_CONTRAST_DB,
     kept_share as kept_share,
     plan_scene as plan_scene,
+)
+from .travel import (
+    quickest_travel as quickest_travel,
 )
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,

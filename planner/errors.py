@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit", "YieldError"]
+__all__ = ["CannotTravel", "ContrastError", "DwellTooShort", "PlanError", "SceneDoesNotFit", "YieldError"]
 
 
 class PlanError(Exception):
@@ -32,6 +32,13 @@ class DwellTooShort(PlanError, ValueError):
     """A frame is over before its pattern could stand.
 
     Example: ``--dwell 0.2`` on a device whose frame changes take 0.34 s.
+    """
+
+
+class CannotTravel(PlanError, ValueError):
+    """Dots are to travel on a device that cannot change one pattern of them into another.
+
+    Example: ``--presentation scroll`` on a device with one lam per chain and no bias.
     """
 
 

@@ -55,11 +55,17 @@ class PatternFamily(ABC):
 
     @abstractmethod
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """How chains get from point to point; None where nothing has to change, or what is wanted cannot be held.
 
         `moves` : whether lam may differ on the way from both ends.
+        `length_s` : seconds that every way lasts, on which levels go as `encoders.crossing` says; None: as quick as is
+        safe. Only asked where `changes`.
         """
 
     def note(self) -> str:
@@ -76,6 +82,11 @@ class AmplitudeFamily(PatternFamily):
     @abstractmethod
     def ramp_s(self) -> float:
         """Longest ramp in seconds."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Shortest way in seconds from one pattern to the next where patterns travel."""
+        return self.ramp_s
 
     @abstractmethod
     def states(self, targets: Floats) -> list[OperatingPoint]:
@@ -107,7 +118,11 @@ class RisingFamily(PatternFamily):
         """From a point to rest, the drive among the ramp's tones."""
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """One by one."""
         return [self._ramp(one, other, moves) for one, other in zip(before, after, strict=True)]

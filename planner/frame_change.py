@@ -17,10 +17,26 @@ from .operating_point import OperatingPoint
 from .plan import Ramp
 from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 
-__all__ = ["ChainSteps", "Change", "change_to", "moves_between"]
+__all__ = ["USUAL", "ChainSteps", "Change", "Pace", "change_to", "moves_between"]
 
 # All of 64 x 64 of a chain of six, which may be held in two ways, would fit.
 MOST_STEPS = 1 << 14
+
+
+class Pace(NamedTuple):
+    """How chains go to a pattern.
+
+    Attributes
+    ----------
+    length_s : how long all of their ways last, None: as short as is safe.
+    awake : no chain rests from then on that can change amplitudes, so that what follows can change all of them.
+    """
+
+    length_s: float | None = None
+    awake: bool = False
+
+
+USUAL = Pace()
 
 
 @dataclass(frozen=True)
@@ -63,8 +79,10 @@ class Change:
         return self.held and not self.lacking
 
 
-def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget]) -> Change:
-    """The change from what chains hold to what they are to hold."""
+def change_to(
+    memory: Memory, before: list[ChainTarget], after: list[ChainTarget], length_s: float | None = None
+) -> Change:
+    """The change from what chains hold to what they are to hold; `length_s` as in `Pace`."""
     device = memory.device
     if device.coupling.scope == "device" and device.chain_length > 1:
         after = _one_lam(memory, after)
@@ -78,7 +96,7 @@ def change_to(memory: Memory, before: list[ChainTarget], after: list[ChainTarget
     # Where lam is common, all waves begin to rise together.
     common = device.coupling.scope == "device" and any(map(_wave, after))
     wait_s = memory.leaving_s(before, moves) if common and before != after else 0.0
-    ramps = memory.ramps(before, after, moves, wait_s)
+    ramps = memory.ramps(before, after, moves, wait_s, length_s)
     if device.coupling.scope == "device" and device.chain_length > 1:
         return _all_alike(memory, before, Change.of(after, tuple(states), tuple(ramps)), moves)
     return Change.of(after, tuple(states), tuple(ramps))
@@ -184,25 +202,34 @@ class ChainSteps:
         self._memory = memory
         self._kinds = memory.kinds_at
         self._apart = device.coupling.scope != "device" and device.drive != "device"
-        self._known: dict[tuple[int, ChainTarget, ChainTarget], _Step] = {}
+        self._known: dict[Pace, dict[tuple[int, ChainTarget, ChainTarget], _Step]] = {}
 
-    def change(self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None = None) -> Change:
+    def change(
+        self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None = None, pace: Pace = USUAL
+    ) -> Change:
         """The change from what chains hold to a pattern; `dots` as in `targets_of`."""
-        wanted, known = targets_of(pattern, self._memory.device, dots), self._known
+        wanted, known = targets_of(pattern, self._memory.device, dots), self._known.setdefault(pace, {})
         try:
             steps = [known[step] for step in zip(self._kinds, before, wanted, strict=True)]
         except KeyError:
-            change = change_to(self._memory, before, self._memory.hold(pattern, before, dots))
+            held = self._memory.hold(pattern, before, dots, pace.awake)
+            change = change_to(self._memory, before, held, pace.length_s)
             if self._apart and change.made:
-                self._remember(before, wanted, change)
+                self._remember(known, before, wanted, change)
             return change
         targets, states, ramps, durations_s, rings = zip(*steps, strict=True)
         return Change(list(targets), states, ramps, max(durations_s), True, "", any(rings))
 
-    def _remember(self, before: Sequence[ChainTarget], wanted: Sequence[ChainTarget], change: Change) -> None:
-        if len(self._known) >= MOST_STEPS:
-            self._known.clear()
+    def _remember(
+        self,
+        known: dict[tuple[int, ChainTarget, ChainTarget], _Step],
+        before: Sequence[ChainTarget],
+        wanted: Sequence[ChainTarget],
+        change: Change,
+    ) -> None:
+        if len(known) >= MOST_STEPS:
+            known.clear()
         ends = zip(self._kinds, before, wanted, strict=True)
         for ask, target, state, ramp in zip(ends, change.targets, change.states, change.ramps, strict=True):
             duration_s, rings = (0.0, False) if ramp is None else (ramp.duration_s, ramp.residue is not None)
-            self._known[ask] = _Step(target, state, ramp, duration_s, rings)
+            known[ask] = _Step(target, state, ramp, duration_s, rings)

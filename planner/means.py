@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from chainsim import Device
 from encoders import Frame
 
-from .frame_change import ChainSteps, Change
+from .frame_change import USUAL, ChainSteps, Change, Pace
 from .memory import Memory
 from .targets import AS_WISHED, ChainTarget, DotGoal
 from .wish import FrameWish
@@ -42,17 +42,17 @@ class Means:
     def _steps(self) -> ChainSteps:
         return ChainSteps(self.memory)
 
-    def change(self, before: list[ChainTarget], frame: Frame) -> Change:
+    def change(self, before: list[ChainTarget], frame: Frame, pace: Pace = USUAL) -> Change:
         """The change from what chains hold to a frame.
 
         Where no way leads to dots as they are aimed at, they are aimed at as they are wished.
         """
         dots = self.dots if self.dots is not None and FrameWish.of(frame).dots else None
-        change = self._steps.change(before, frame.pattern, dots)
+        change = self._steps.change(before, frame.pattern, dots, pace)
         if dots is None or change.made:
             return change
         wished = replace(dots, loudest=AS_WISHED)
-        return self._steps.change(before, frame.pattern, wished)
+        return self._steps.change(before, frame.pattern, wished, pace)
 
 
 def plain_means(device: Device, contrast_db: float) -> Means:

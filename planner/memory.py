@@ -40,7 +40,7 @@ class Memory:
         self._points: dict[ChainTarget, OperatingPoint] = {}
         self._states: dict[ChainTarget, OperatingPoint] = {}
         self._ramps: dict[Transition, Ramp | None] = {}
-        self._turned: dict[tuple[ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
+        self._turned: dict[tuple[ChainTarget, ChainTarget, bool, float, float | None], Ramp | None] = {}
 
     @cached_property
     def rest(self) -> ChainTarget:
@@ -58,16 +58,20 @@ class Memory:
         return [self.rest] * (self.device.chains)
 
     def hold(
-        self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None
+        self,
+        pattern: TargetPattern,
+        before: Sequence[ChainTarget],
+        dots: DotGoal | None = None,
+        awake: bool = False,
     ) -> list[ChainTarget]:
-        """What chains hold for a pattern, given what they held; `dots` as in `targets_of`."""
-        targets = list(map(self.held, targets_of(pattern, self.device, dots), before))
+        """What chains hold for a pattern, given what they held; `dots` as in `targets_of`, `awake` as in `held`."""
+        targets = [self.held(*one, awake) for one in zip(targets_of(pattern, self.device, dots), before, strict=True)]
         self.prepare(targets)
         return targets
 
-    def held(self, target: ChainTarget, before: ChainTarget) -> ChainTarget:
-        """What a chain holds for a target, given what it held."""
-        ask = (target.unturned, isinstance(before, AmplitudeTarget) and not before.resting)
+    def held(self, target: ChainTarget, before: ChainTarget, awake: bool = False) -> ChainTarget:
+        """What a chain holds for a target, given what it held; `awake`: as though that were some amplitudes."""
+        ask = (target.unturned, awake or (isinstance(before, AmplitudeTarget) and not before.resting))
         if ask not in self._held:
             if len(self._held) >= MOST_STATES:
                 self._held.clear()
@@ -109,25 +113,38 @@ class Memory:
             self._cache.keep((b"state" + target.key, point) for target, point in made.items())
 
     def ramps(
-        self, before: Sequence[ChainTarget], after: Sequence[ChainTarget], moves: bool, wait_s: float
+        self,
+        before: Sequence[ChainTarget],
+        after: Sequence[ChainTarget],
+        moves: bool,
+        wait_s: float,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """The ramps from one to the other; None where a chain already stands.
 
         `wait_s` : how many seconds after the start a wave begins to rise at the earliest.
+        `length_s` : how long each is to last; None: as short as is safe.
         """
         pairs = list(zip(before, after, strict=True))
-        self.prepare_ramps(pairs, moves)
-        return [self.ramp(one, other, moves, wait_s) for one, other in pairs]
+        self.prepare_ramps(pairs, moves, length_s)
+        return [self.ramp(one, other, moves, wait_s, length_s) for one, other in pairs]
 
-    def ramp(self, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float = 0.0) -> Ramp | None:
+    def ramp(
+        self,
+        before: ChainTarget,
+        after: ChainTarget,
+        moves: bool,
+        wait_s: float = 0.0,
+        length_s: float | None = None,
+    ) -> Ramp | None:
         """The ramp of one chain, as in `ramps`."""
         if before == after:
             return None
-        ask = (before, after, moves, wait_s)
+        ask = (before, after, moves, wait_s, length_s)
         if ask not in self._turned:
             if len(self._turned) >= MOST_RAMPS:
                 self._turned.clear()
-            self._turned[ask] = self._ramp(before, after, moves, wait_s)
+            self._turned[ask] = self._ramp(*ask)
         return self._turned[ask]
 
     def leaving_s(self, targets: Sequence[ChainTarget], moves: bool) -> float:
@@ -135,10 +152,12 @@ class Memory:
         ramps = (self.ramp(target, self.rest, moves) for target in targets)
         return max((ramp.duration_s for ramp in ramps if ramp is not None), default=0.0)
 
-    def _ramp(self, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float) -> Ramp | None:
+    def _ramp(
+        self, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float, length_s: float | None = None
+    ) -> Ramp | None:
         waits = before.resting and wait_s > 0 and not isinstance(after, AmplitudeTarget)
         if self.planner.direct(before, after) and not waits:
-            transition = Transition(before.unturned, after.unturned, moves)
+            transition = Transition(before.unturned, after.unturned, moves, length_s)
             self._go([transition])
             ramp = self._ramps[transition]
             return None if ramp is None else turned_ramp(ramp, before.turn if after.resting else after.turn)
@@ -146,13 +165,15 @@ class Memory:
         enter = self._ramp(self.rest, after, moves, 0.0)
         return self.planner.by_rest(leave, enter, self.state(before), self.state(after), wait_s)
 
-    def prepare_ramps(self, pairs: Iterable[tuple[ChainTarget, ChainTarget]], moves: bool) -> None:
+    def prepare_ramps(
+        self, pairs: Iterable[tuple[ChainTarget, ChainTarget]], moves: bool, length_s: float | None = None
+    ) -> None:
         """Plan many ramps between amplitudes at once, which is quicker than one by one."""
         if not self.planner.family(AmplitudeTarget).changes:
             return
         self._go(
             [
-                Transition(one.unturned, other.unturned, moves)
+                Transition(one.unturned, other.unturned, moves, length_s)
                 for one, other in dict.fromkeys(pairs)
                 if isinstance(one, AmplitudeTarget) and isinstance(other, AmplitudeTarget)
                 and one.turn == other.turn and one != other

@@ -20,11 +20,15 @@ __all__ = ["Planner", "Transition"]
 
 
 class Transition(NamedTuple):
-    """From one target to another, neither of them turned; `moves` where lam may differ on the way from both ends."""
+    """From one target to another, neither of them turned; `moves` where lam may differ on the way from both ends.
+
+    `length_s` is how long the way is to last; None: as short as is safe.
+    """
 
     before: ChainTarget
     after: ChainTarget
     moves: bool
+    length_s: float | None = None
 
     @property
     def target(self) -> ChainTarget:
@@ -34,7 +38,8 @@ class Transition(NamedTuple):
     @property
     def key(self) -> bytes:
         """The transition in bytes, for a cache on disk."""
-        return b"%d" % self.moves + self.before.key + b" to " + self.after.key
+        length = b"" if self.length_s is None else b" in %r s" % self.length_s
+        return b"%d" % self.moves + self.before.key + b" to " + self.after.key + length
 
 
 @dataclass(frozen=True)
@@ -91,12 +96,13 @@ class Planner:
         ----------
         before, after : the points of each transition.
         """
-        alike: dict[tuple[type[ChainTarget], bool], list[int]] = defaultdict(list)
+        alike: dict[tuple[type[ChainTarget], bool, float | None], list[int]] = defaultdict(list)
         for place, one in enumerate(transitions):
-            alike[(type(one.target), one.moves)].append(place)
+            alike[(type(one.target), one.moves, one.length_s)].append(place)
         ramps: dict[int, Ramp | None] = {}
-        for (kind, moves), places in alike.items():
-            made = self.family(kind).ramps([before[i] for i in places], [after[i] for i in places], moves)
+        for (kind, moves, length_s), places in alike.items():
+            ends = [before[i] for i in places], [after[i] for i in places]
+            made = self.family(kind).ramps(*ends, moves, length_s)
             ramps.update(zip(places, made, strict=True))
         return [ramps[place] for place in range(len(transitions))]
 

@@ -9,10 +9,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from chainsim import Device, Outcome
-from encoders import Frame, Scene
+from encoders import STANDS_FROM, Frame, Scene
 
-from .errors import ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
-from .frame_change import Change, change_to
+from .errors import CannotTravel, ContrastError, DwellTooShort, SceneDoesNotFit, YieldError
+from .family import AmplitudeFamily
+from .frame_change import USUAL, Change, Pace, change_to
 from .means import Means, plain_means
 from .memory import Memory
 from .operating_point import OperatingPoint
@@ -111,10 +112,10 @@ class _Frames:
         position = 0
         self._following = None
         for frame in self._scene.frames:
-            change = means.change(targets, frame)
+            samples = max(1, round(frame.dwell_s * rate))
+            change = means.change(targets, frame, self._pace(frame, samples / rate))
             # What cannot be held is not played, and the next frame begins at rest.
             targets = change.targets if change.held else memory.at_rest
-            samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
             if not change.held and self._following is not None:
                 self._following.rest()
@@ -123,19 +124,41 @@ class _Frames:
         if any(ramp is not None for ramp in change.ramps):
             yield self._frame(None, position, int(change.longest_s * rate) + 2, change)
 
+    def _pace(self, frame: Frame, length_s: float) -> Pace:
+        """How chains go to a frame; raises where it travels and they cannot, or not as quickly."""
+        if not (frame.travels or frame.leads):
+            return USUAL
+        family = self.means.memory.planner.family(AmplitudeTarget)
+        if not isinstance(family, AmplitudeFamily):
+            from .waves.speeds import cannot_travel
+
+            raise CannotTravel(cannot_travel(self._device))
+        if not frame.travels:
+            return Pace(awake=True)
+        if length_s < family.shortest_s:
+            most = math.floor(100 / family.shortest_s) / 100
+            raise DwellTooShort(
+                f"{self._device.name} does not pass {1 / length_s:.3g} columns or places in a second: it takes "
+                f"{family.shortest_s:.3g} s from one to the next; let at most {most:g} pass in a second (--rate in "
+                "cells, in a job columns_per_s or actuators_per_s)"
+            )
+        return Pace(length_s, awake=True)
+
     def _frame(self, frame: Frame | None, position: int, samples: int, change: Change) -> FramePlan:
         rate = self._device.amplifier.rate_hz
-        longest = change.longest_s
+        longest, length_s = change.longest_s, samples / rate
         start_s, end_s = position / rate, (position + samples) / rate
-        if longest >= end_s - start_s:
+        travels = frame is not None and frame.travels
+        if longest >= length_s and not travels:
             raise DwellTooShort(
-                f"a frame of {end_s - start_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
+                f"a frame of {length_s:.3g} s is shorter than the {longest:.3g} s that {self._device.name} "
                 f"takes to change a pattern; show frames for {1.5 * longest:.2g} s or more (--dwell, in a job dwell_s)"
             )
-        times = start_s, start_s + longest, end_s
+        times = start_s, start_s + (STANDS_FROM * length_s if travels else longest), end_s
         # After the way out nothing is to be felt any more.
-        residue = 0.0 if frame is None else self._left(change, start_s, longest, end_s - start_s)
-        outcome, note = verdict(change, residue, self.means.memory)
+        settled_s = length_s - 1 / self._device.f0_hz if travels else longest
+        residue = 0.0 if frame is None else self._left(change, start_s, settled_s, length_s)
+        outcome, note = verdict(change, residue, self.means.memory, travels)
         whole = FramePlan(
             frame, *times, change.states, change.ramps, outcome, note, contrast_db=self._asked_db, residue=residue
         )
@@ -158,7 +181,7 @@ class _Frames:
         return max(found, self._following.through(change.states, change.ramps, *moments))
 
 
-def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, str]:
+def verdict(change: Change, residue: float, memory: Memory, travels: bool = False) -> tuple[Outcome, str]:
     """What comes of a change that leaves `residue`, of full scale, and a sentence where that is not ok."""
     if change.made and residue <= AMPLITUDE_ERROR_LIMIT:
         return Outcome.OK, ""
@@ -168,10 +191,11 @@ def verdict(change: Change, residue: float, memory: Memory) -> tuple[Outcome, st
     cannot = f"{memory.device.name} cannot change to this pattern"
     if change.lacking:
         return Outcome.UNREACHABLE, f"{cannot}: {change.lacking}."
+    longer = "" if travels else "for longer (--dwell, in a job dwell_s), or "
     note = (
         f"{cannot}: what changes leave rings on at "
         f"{100 * residue:.2g} % of full scale, {100 * AMPLITUDE_ERROR_LIMIT:g} % are allowed; "
-        "show frames for longer (--dwell, in a job dwell_s), or with flat dots among those that are raised."
+        f"show frames {longer}with flat dots among those that are raised."
     )
     return Outcome.UNREACHABLE, note
 

@@ -51,7 +51,7 @@ class UnequalMemory(Memory):
         super().__init__(device, contrast_db, self._alone)
         self._of_kind = [Memory(alone, contrast_db, whole=self) for alone in self._alone]
         self._set: dict[tuple[int, ChainTarget], OperatingPoint] = {}
-        self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float], Ramp | None] = {}
+        self._set_ramps: dict[tuple[int, ChainTarget, ChainTarget, bool, float, float | None], Ramp | None] = {}
 
     @property
     def kinds_at(self) -> Sequence[int]:
@@ -59,11 +59,15 @@ class UnequalMemory(Memory):
         return self._kind_at
 
     def hold(
-        self, pattern: TargetPattern, before: Sequence[ChainTarget], dots: DotGoal | None = None
+        self,
+        pattern: TargetPattern,
+        before: Sequence[ChainTarget],
+        dots: DotGoal | None = None,
+        awake: bool = False,
     ) -> list[ChainTarget]:
-        """What chains hold for a pattern, given what they held; `dots` as in `targets_of`."""
+        """What chains hold for a pattern, given what they held; `dots` and `awake` as in `Memory.hold`."""
         wanted = zip(self._kind_at, targets_of(pattern, self.device, dots), before, strict=True)
-        targets = [self._of_kind[kind].held(target, one) for kind, target, one in wanted]
+        targets = [self._of_kind[kind].held(target, one, awake) for kind, target, one in wanted]
         for kind, memory in enumerate(self._of_kind):
             memory.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
         return targets
@@ -132,21 +136,34 @@ class UnequalMemory(Memory):
         )
 
     def ramps(
-        self, before: Sequence[ChainTarget], after: Sequence[ChainTarget], moves: bool, wait_s: float
+        self,
+        before: Sequence[ChainTarget],
+        after: Sequence[ChainTarget],
+        moves: bool,
+        wait_s: float,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """The ways from one to the other, as the device is set on them; None where a chain already stands."""
         pairs = list(zip(self._kind_at, before, after, strict=True))
         for kind, memory in enumerate(self._of_kind):
             same = [(one, other) for at, one, other in pairs if at == kind]
-            memory.prepare_ramps(same, moves)
-        return [self._set_ramp(kind, one, other, moves, wait_s) for kind, one, other in pairs]
+            memory.prepare_ramps(same, moves, length_s)
+        return [self._set_ramp(kind, one, other, moves, wait_s, length_s) for kind, one, other in pairs]
 
-    def _set_ramp(self, kind: int, before: ChainTarget, after: ChainTarget, moves: bool, wait_s: float) -> Ramp | None:
-        ask = (kind, before, after, moves, wait_s)
+    def _set_ramp(
+        self,
+        kind: int,
+        before: ChainTarget,
+        after: ChainTarget,
+        moves: bool,
+        wait_s: float,
+        length_s: float | None,
+    ) -> Ramp | None:
+        ask = (kind, before, after, moves, wait_s, length_s)
         if ask not in self._set_ramps:
             if len(self._set_ramps) >= MOST_STATES:
                 self._set_ramps.clear()
-            ramp = self._of_kind[kind].ramp(before, after, moves, wait_s)
+            ramp = self._of_kind[kind].ramp(*ask[1:])
             self._set_ramps[ask] = None if ramp is None else self._as_set(kind, ramp)
         return self._set_ramps[ask]
 

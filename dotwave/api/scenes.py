@@ -114,23 +114,24 @@ def text(
 def texture(
     kind: Mapping[str, Any] | TargetPattern, device: AnyDevice = USUAL_DEVICE, *, dwell_s: float = 2.0
 ) -> Scene:
-    """One pattern: a wave, bars (also at an angle), rings, walking bars, levels, or regions of them.
+    """A wave, bars at any angle, rings, walking bars, levels, regions of them; text or bars that scroll, a moving dot.
 
     Parameters
     ----------
     kind : mapping or encoders.TargetPattern
         As the key `texture` of a job file: ``{"wave": {"lag_deg": 60}}``, ``{"bars": {"width": 1, "gap": 1}}``,
         ``{"rings": {"row": 2.5, "col": 2.5, "width": 1, "gap": 1}}``, ``{"walking_bars": {"rate_hz": 3}}``,
-        ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row).
+        ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row),
+        ``{"scroll": {"text": "Hello", "columns_per_s": 3}}``, ``{"dot": {"arrow": "right", "actuators_per_s": 3}}``.
     device : Device, name, file or mapping
         Whose grid it covers.
     dwell_s : float
-        Seconds it is felt.
+        Seconds it is felt; a text that scrolls takes as long as it is.
 
     Returns
     -------
     encoders.Scene
-        Of one frame.
+        Of one frame; of what moves one for each place it passes (`encoders.levels_at` says what is between).
 
     Raises
     ------
@@ -148,7 +149,7 @@ def texture(
     from ..jobs.texture import TexturePart
 
     part = _checked(TexturePart, dict(kind) | {"dwell_s": dwell_s}, "texture")
-    return still_scene(part.target(shape_of(_device(device))), part.dwell_s, f"texture: {part.kind}")
+    return part.scene(shape_of(_device(device)))
 
 
 def job(path: str | PathLike[str]) -> DeviceScene:

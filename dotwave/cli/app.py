@@ -76,7 +76,7 @@ Words = Annotated[
         autocompletion=completed_texts(),
     ),
 ]
-Shown = Annotated[Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot.")]
+Shown = Annotated[Presentation | None, typer.Option(help="Show a page at once, row by row, dot by dot; or scroll.")]
 Start = Annotated[
     str | None, typer.Option("--from", metavar="PAGE|CHAPTER|WORDS", help="Begin at a page, heading or words.")
 ]

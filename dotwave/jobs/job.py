@@ -44,8 +44,9 @@ from encoders import (
 )
 
 from ..request import TOLERANCES
+from .part import Part, Positive, Seconds
 from .paths import FilePath
-from .texture import Part, Positive, Seconds, TexturePart
+from .texture import TexturePart
 
 __all__ = [
     "SCHEMA",

@@ -124,7 +124,9 @@ class _Item:
                 given if given.style is not Style.AUTO else given.model_copy(update={"style": Style.ICON})
             )
         if item.texture is not None:
-            return still_scene(item.texture.target(self.shape), item.texture.dwell_s, f"texture: {item.texture.kind}")
+            if item.texture.scroll is not None:
+                self.reach.table(item.texture.scroll.table, self.at("scroll", "table"))
+            return item.texture.scene(self.shape)
         assert item.pause_s is not None
         blank = np.zeros((self.shape.rows, self.shape.cols), np.complex128)
         blank.flags.writeable = False

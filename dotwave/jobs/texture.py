@@ -1,15 +1,15 @@
-"""The textures of a job file, and what all parts of a job file have in common."""
+"""The textures of a job file."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema
+from pydantic import Field, model_validator
 
 from encoders import (
     GridShape,
     Region,
+    Scene,
     TargetPattern,
     bars,
     levels,
@@ -18,38 +18,13 @@ from encoders import (
     rings,
     slanted_bars,
     walking_bars,
-)  # fmt: skip
+)
 
-__all__ = ["NotNegative", "Part", "Positive", "Seconds", "TexturePart"]
+from ..scenes import still_scene
+from .part import AtLeastOne, Finite, Level, Part, Place, Positive, Seconds
+from .travel import DotPart, ScrollPart
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Seconds = Annotated[float, Field(gt=0, le=3600)]
-Level = Annotated[float, Field(gt=0, le=1)]
-AtLeastOne = Annotated[int, Field(ge=1)]
-Place = Annotated[int, Field(ge=0)]
-
-
-class Part(BaseModel):
-    """A section of a job file: unknown keys are refused, nothing changes after reading.
-
-    Where `short` names a key, the section may be written as that key's text alone.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    short: ClassVar[str] = ""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_text(cls, value: Any) -> Any:
-        return {cls.short: value} if cls.short and isinstance(value, str) else value
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The section's schema; text alone fits too where there is a short form."""
-        schema = handler(core)
-        return {"anyOf": [{"type": "string"}, schema]} if cls.short else schema
+__all__ = ["TexturePart"]
 
 
 class WavePart(Part):
@@ -132,12 +107,15 @@ class TexturePart(Part):
     walking_bars: Walking | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
+    scroll: ScrollPart | None = None
+    dot: DotPart | None = None
     dwell_s: Seconds = 2.0
 
     @model_validator(mode="after")
     def _one(self) -> TexturePart:
         if sum(value is not None for name, value in self if name != "dwell_s") != 1:
-            raise ValueError("give exactly one of wave, bars, slanted_bars, rings, walking_bars, levels, regions")
+            kinds = ", ".join(name for name in type(self).model_fields if name != "dwell_s")
+            raise ValueError(f"give exactly one of {kinds}")
         return self
 
     @property
@@ -145,14 +123,20 @@ class TexturePart(Part):
         """The key that is given."""
         return next(name for name, value in self if name != "dwell_s" and value is not None)
 
-    def target(self, shape: GridShape) -> TargetPattern:
+    def scene(self, shape: GridShape) -> Scene:
         """The texture on a grid.
 
         Raises
         ------
-        encoders.TextureError
-            When it does not fit the grid.
+        encoders.EncodeError
+            When it does not fit the grid, or a text has nothing to show.
         """
+        moving = self.scroll or self.dot
+        if moving is not None:
+            return moving.scene(shape, self.dwell_s)
+        return still_scene(self._target(shape), self.dwell_s, f"texture: {self.kind}")
+
+    def _target(self, shape: GridShape) -> TargetPattern:
         if self.slanted_bars is not None:
             return slanted_bars(shape, **self.slanted_bars.model_dump())
         if self.rings is not None:

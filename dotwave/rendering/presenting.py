@@ -14,6 +14,10 @@ from ..request import Request
 __all__ = ["Presented", "presented"]
 
 
+# A text scrolls only where that is asked for.
+PAGES = (Presentation.TOGETHER, Presentation.BY_ROW, Presentation.BY_DOT)
+
+
 class Presented(NamedTuple):
     """A scene to plan, and sentences on why it is shown as it is."""
 
@@ -30,7 +34,7 @@ def presented(scene: Scene, device: Device, request: Request) -> Presented:
         return Presented(scene)
     shares: dict[Presentation, float] = {}
     shown = {}
-    for presentation in Presentation:
+    for presentation in PAGES:
         frames = scene.text_frames
         encoded = encode_text(frames.source, scene.shape, replace(frames.options, presentation=presentation))
         shown[presentation] = replace(encoded, parts=scene.parts)

@@ -96,6 +96,8 @@ class FrameCheck:
         are wanted, and of the worst tone where there are several.
     wanted_cells, felt_cells : Unicode Braille, lines separated by a newline.
     text : the source's span.
+    way_error : of what travels the worst deviation from the smooth way of its levels, else None; part of
+        `amplitude_error`.
     """
 
     page: int
@@ -112,6 +114,7 @@ class FrameCheck:
     wanted_cells: str = ""
     felt_cells: str = ""
     text: str = ""
+    way_error: float | None = None
 
     def __repr__(self) -> str:
         error = f"error {100 * self.amplitude_error:.2f} %"
@@ -235,6 +238,9 @@ class VerifyReport:
         yield f"Lowest contrast: {decibels(self.contrast_db)} ({self._contrast_wanted()})."
         worst = f"{100 * self.amplitude_error:.2f} % of full scale"
         yield f"Worst amplitude error: {worst} (at most {100 * AMPLITUDE_ERROR_LIMIT:g} % wanted)."
+        ways = [frame.way_error for frame in self.frames if frame.way_error is not None]
+        if ways:
+            yield f"Travelling patterns are at most {100 * max(ways):.2f} % of full scale beside their way."
         aside = max((frame.aside for frame in self.frames), default=0.0)
         if aside > AMPLITUDE_ERROR_LIMIT:
             yield f"What is to be felt is aimed at up to {100 * aside:.0f} % of full scale beside the wish."

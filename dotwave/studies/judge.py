@@ -124,7 +124,7 @@ class Judge:
         reached, met = self._reached(device) if held else ((), True)
         beside: dict[str, Printable] = {}
         if request.explain:
-            reached += tuple(self._standing(device))
+            reached += (*self._standing(device), *self._travelling(device))
             from .tradeoff import ExplainReport
 
             beside["requirement"] = ExplainReport(self._required(device, request.tol or USUAL_TOL))
@@ -148,6 +148,20 @@ class Judge:
         worst = max((frame.error + standing_error(device, frame.states, frame.end_s) for frame in frames), default=0.0)
         if worst > max((frame.error for frame in frames), default=0.0):
             yield f"As built, standing dots are off by up to {_percent(worst)} (higher modes, creep, hysteresis)."
+
+    def _travelling(self, device: Device) -> Iterator[str]:
+        """How fast patterns travel, how fast they could, and how sharp they are on their way."""
+        speeds = [1 / (frame.end_s - frame.start_s) for frame in self._frames if frame.frame and frame.frame.travels]
+        if not speeds:
+            return
+        from planner import quickest_travel
+
+        most = quickest_travel(device, contrast_db=self.request.contrast_db)
+        ends = " to ".join(dict.fromkeys(f"{speed:.3g}" for speed in (min(speeds), max(speeds))))
+        yield (
+            f"Patterns travel, {ends} a second; {device.name} can {most:.3g}. A dot is within 0.2 % of its full level "
+            "for two fifths of the time, and at half of it in two places in the middle of its way."
+        )
 
     def _yield(self) -> YieldReport | None:
         """On how many devices all frames are felt as wished; None where none has a spread."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from chainsim import Device
+from encoders import SMOOTHNESS
 from planner import FramePlan, OperatingPoint
 
 from ..errors import WaveformError
@@ -44,6 +45,8 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
     goes_on, page_number = [asdict(one) for one in frame.frame.goes_on], frame.frame.number
     rare = {"contrast_db": frame.wish.contrast_db, "goes_on": goes_on, "number": page_number and asdict(page_number)}
     mark |= {key: value for key, value in rare.items() if value}
+    if frame.frame.travels:
+        mark["smoothness"] = SMOOTHNESS
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):

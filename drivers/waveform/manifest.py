@@ -60,6 +60,8 @@ class FrameMark:
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
     goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
+    smoothness : where the pattern travels, order of the smooth step that levels go along over the whole of the frame,
+        from those of the frame before to these (`encoders.crossing`); else 0.
     """
 
     start_s: float
@@ -78,6 +80,7 @@ class FrameMark:
     wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
     number: PageNumber | None = None
+    smoothness: int = 0
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,7 @@ class _Frame(_Part):
     moving: list[bool] | None = None
     goes_on: list[_GoesOn] = []
     number: _PageNumber | None = None
+    smoothness: Literal[0, 9] = 0
 
 
 class _Heading(_Part):
@@ -275,6 +276,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
         number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
+        smoothness=frame.smoothness,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -15,10 +15,12 @@ from ..scene import TargetPattern
 from .dots import blocks
 from .layout import Layout
 
-__all__ = ["MIN_PART_S", "ShownPage", "presenter", "read_cells"]
+__all__ = ["MIN_PART_S", "ShownPage", "presenter", "read_cells", "read_page"]
 
 MIN_PART_S = 0.6
 """A part of a page lasts at least this long: up to 0.35 s of ramp, and 0.25 s to feel it."""
+WHOLE = (Presentation.TOGETHER, Presentation.SCROLL)
+"""Presentations of all dots of a page, or of a line, at a time."""
 _CACHE_BYTES = 16_000_000
 
 
@@ -44,7 +46,7 @@ def presenter(layout: Layout, presentation: Presentation) -> Callable[[str], Sho
         lines = "\n".join([page[at : at + width] for at in range(0, len(page), width)])
         return ShownPage(lines, tuple([_pattern(part) for part in _parts(grid, places, presentation)]))
 
-    size = 16 * shape[0] * shape[1] * (1 if presentation is Presentation.TOGETHER else layout.height * layout.lines)
+    size = 16 * shape[0] * shape[1] * (1 if presentation in WHOLE else layout.height * layout.lines)
     return lru_cache(maxsize=max(16, min(4096, _CACHE_BYTES // size)))(show)
 
 
@@ -60,7 +62,7 @@ def _places(layout: Layout) -> NDArray[np.intp]:
 def _parts(
     grid: NDArray[np.complex128], places: NDArray[np.intp], presentation: Presentation
 ) -> list[NDArray[np.complex128]]:
-    if presentation is Presentation.TOGETHER:
+    if presentation in WHOLE:
         return [grid]
     flat = np.arange(grid.size).reshape(grid.shape)
     if presentation is Presentation.BY_ROW:
@@ -105,6 +107,22 @@ def read_cells(dots: NDArray[np.bool_], encoding: Mapping[str, Any]) -> str:
     felt = dots[row, col]
     codes = (felt * _WEIGHTS[:height]).sum(axis=(2, 3), dtype=np.uint16) + np.uint16(0x2800)
     return "\n".join(codes[at].astype("<u2").tobytes().decode("utf-16-le") for at in range(lines))
+
+
+def read_page(parts: Sequence[NDArray[np.bool_]], encoding: Mapping[str, Any]) -> str:
+    """Cells felt of a page that was shown in parts, as `read_cells`: all parts together.
+
+    Of a text that scrolls the parts are the patterns that travelled by, one after another. What is felt at the right
+    edge of each is put side by side, and read.
+    """
+    if encoding.get("presentation") != Presentation.SCROLL:
+        return read_cells(np.any(parts, axis=0), encoding)
+    passed = np.stack([part[:, -1] for part in parts], axis=1)
+    length = int(encoding["cells_per_line"]) * (2 + int(encoding["cell_gap"]))
+    strip = np.zeros((len(passed), length), dtype=np.bool_)
+    count = min(length, passed.shape[1])
+    strip[:, :count] = passed[:, :count]
+    return read_cells(strip, encoding)
 
 
 _WEIGHTS = np.array([[1, 8], [2, 16], [4, 32], [64, 128]], dtype=np.uint16)

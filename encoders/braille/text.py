@@ -12,22 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from ..choices import EmphasisChoice, PageNumbering, Presentation, TextOptions, Undefined
-from ..errors import EmptyText, LayoutError
+from ..choices import EmphasisChoice, PageNumbering, Presentation, TextOptions
+from ..errors import LayoutError
 from ..scene import Frame, GridShape, PageNumber, Scene, TargetPattern
 from . import louis_binding
-from .alphabet import alphabet, own_letters_eight
+from .alphabet import own_letters_eight
 from .back_check import BackCheck, FeltPage, back_check
 from .dots import BLANK, HIGHEST_6_DOT
 from .filling import paginate
 from .joining import emphases_within
 from .layout import FLUSH, Cut, Layout, LineStyle, Page, PlacedWord, SplitNote, cut_anywhere
-from .presentation import MIN_PART_S, presenter, read_cells
+from .presentation import MIN_PART_S, presenter, read_page
 from .readers.sources import SourceKind, TextSource
 from .report import EncodingReport, ReportLog, Split
 from .tables import resolve_tables, table_dots
-from .transcribe import LINE_END, PARAGRAPH_END, Transcriber, paragraphs
-from .undefined import writable
+from .transcribe import LINE_END, PARAGRAPH_END, Transcriber, paragraphs, refuse_unwritable
 
 __all__ = ["TextFrames", "TextScene", "encode_text"]
 
@@ -95,9 +94,16 @@ def encode_text(source: TextSource | str, shape: GridShape, options: TextOptions
 def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> TextFrames:
     tables = resolve_tables(options.table)
     dots = _dots(source, tables, shape, options)
-    layout = Layout(shape, 3 if dots == 6 else 4, options.cell_gap, options.line_gap)
+    height = 3 if dots == 6 else 4
+    if options.presentation is Presentation.SCROLL:
+        # Imported here: pages that stand do without.
+        from .scroll import scroll_layout
+
+        layout = scroll_layout(shape, height, options)
+    else:
+        layout = Layout(shape, height, options.cell_gap, options.line_gap)
     transcriber = Transcriber(tables, options.undefined, dots, passages=layout.run < layout.capacity)
-    _refuse_unwritable(source, transcriber)
+    refuse_unwritable(source, transcriber)
     corner = options.page_numbers is PageNumbering.CORNER
     if corner and layout.capacity < 2:
         raise LayoutError("page-numbers: a page of one cell has no room for a number; choose frame or none")
@@ -115,8 +121,8 @@ def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> Te
         "kind": source.kind.value,
         "tables": list(tables),
         "dots": dots,
-        "cell_gap": options.cell_gap,
-        "line_gap": options.line_gap,
+        "cell_gap": layout.cell_gap,
+        "line_gap": layout.line_gap,
         "lines": layout.lines,
         "cells_per_line": layout.cells_per_line,
         "run": layout.run,
@@ -131,7 +137,7 @@ def _frames_of(source: TextSource, shape: GridShape, options: TextOptions) -> Te
         encoding["page_numbers"] = options.page_numbers.value
     if source.emphases:
         encoding["emphases"] = [list(one) for one in source.emphases]
-    return TextFrames(source, transcriber, layout, options, encoding)
+    return TextFrames(source, transcriber, layout, options, encoding, shape)
 
 
 def _by_lines(source: TextSource, options: TextOptions, layout: Layout) -> bool:
@@ -168,23 +174,6 @@ def _dots(source: TextSource, tables: tuple[str, ...], shape: GridShape, options
     return 8
 
 
-def _refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
-    """Look at the characters once before the first frame, so that a text that cannot be shown fails at once."""
-    letters = alphabet(transcriber.tables)
-    if source.kind is SourceKind.BRAILLE or not letters.lacks(source.text):
-        return
-    if transcriber.undefined is Undefined.ERROR:
-        for start, end in paragraphs(source.text):
-            for _ in transcriber.words(source, start, end, ReportLog()):
-                pass
-    different = "".join(sorted(set(source.text)))
-    if not writable(different, 0, letters, transcriber.undefined, ReportLog()).text.strip():
-        raise EmptyText(
-            f"{source.name}: the table {','.join(transcriber.tables)} can write none of its characters; "
-            "choose another table, or --undefined name"
-        )
-
-
 class TextFrames:
     """The frames of a text: iterating encodes, and keeps the frames of a text that is not long.
 
@@ -199,9 +188,11 @@ class TextFrames:
         layout: Layout,
         options: TextOptions,
         encoding: dict[str, Any],
+        shape: GridShape,
     ) -> None:
         self.source = source
         self.layout = layout
+        self.shape = shape
         self.encoding = encoding
         self._transcriber = transcriber
         self.options = options
@@ -224,13 +215,20 @@ class TextFrames:
             return
         kept: list[Frame] | None = []
         most = MOST_KEPT // (self.layout.shape.rows * self.layout.shape.cols)
-        for number, frame in enumerate(self._encoded(), 1):
+        for number, frame in enumerate(self._moved(), 1):
             if number > most:
                 kept = None
             if kept is not None:
                 kept.append(frame)
             yield frame
         self._kept = None if kept is None else tuple(kept)
+
+    def _moved(self) -> Iterator[Frame]:
+        if self.options.presentation is not Presentation.SCROLL:
+            return self._encoded()
+        from .scroll import scrolled
+
+        return scrolled(self._encoded(), self.layout, self.shape, self.options.rate)
 
     def _encoded(self) -> Iterator[Frame]:
         self._log = log = ReportLog()
@@ -338,10 +336,11 @@ class TextFrames:
         text that is not long were encoded for before serves here too.
         """
         pages: list[FeltPage] = []
+        scrolls = self.options.presentation is Presentation.SCROLL
         for _, group in groupby(self, key=lambda frame: frame.page):
             parts = list(group)
-            dots = np.any([np.abs(part.pattern.amplitude) > 0.5 for part in parts], axis=0)
+            dots = [np.abs(part.pattern.amplitude) > 0.5 for part in parts if part.travels == scrolls]
             emphases = emphases_within(self.source.emphases, *parts[0].span)
-            cells, first = read_cells(dots, self.encoding), parts[0]
+            cells, first = read_page(dots, self.encoding), parts[0]
             pages.append(FeltPage(cells, first.text, first.goes_on, emphases, first.number))
         return back_check(pages, self.source.text, self.encoding, self.source.emphases)

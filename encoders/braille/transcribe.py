@@ -10,6 +10,7 @@ from itertools import islice
 from typing import NamedTuple
 
 from ..choices import Undefined
+from ..errors import EmptyText
 from . import louis_binding
 from .alphabet import alphabet
 from .cuts import Cutter, continuation_sign
@@ -21,7 +22,7 @@ from .tables import hyphenation_tables
 from .translation import translated
 from .undefined import ZERO_WIDTH_JOINER, Writable, extends, writable
 
-__all__ = ["LINE_END", "PARAGRAPH_END", "Transcriber", "paragraphs"]
+__all__ = ["LINE_END", "PARAGRAPH_END", "Transcriber", "paragraphs", "refuse_unwritable"]
 
 PIECE = 2000
 """Characters handed to liblouis at once, at most; its answers cost about a hundred bytes a character."""
@@ -294,3 +295,26 @@ def _hard_cut(text: str, start: int, cut: int) -> int:
     while back < len(text) and text[back] == text[back - 1] and text[back] > _ARROWS and not text[back].isalnum():
         back += 1  # equal signs are counted together, see `undefined`
     return back
+
+
+def refuse_unwritable(source: TextSource, transcriber: Transcriber) -> None:
+    """Look at the characters once before the first frame, so that a text that cannot be shown fails at once.
+
+    Raises
+    ------
+    EmptyText, UndefinedCharacter
+        When the table can write none of them, or the policy is `error` and it cannot write one.
+    """
+    letters = alphabet(transcriber.tables)
+    if source.kind is SourceKind.BRAILLE or not letters.lacks(source.text):
+        return
+    if transcriber.undefined is Undefined.ERROR:
+        for start, end in paragraphs(source.text):
+            for _ in transcriber.words(source, start, end, ReportLog()):
+                pass
+    different = "".join(sorted(set(source.text)))
+    if not writable(different, 0, letters, transcriber.undefined, ReportLog()).text.strip():
+        raise EmptyText(
+            f"{source.name}: the table {','.join(transcriber.tables)} can write none of its characters; "
+            "choose another table, or --undefined name"
+        )

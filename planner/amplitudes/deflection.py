@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import Closure, Outcome, Setting
+from encoders import SMOOTHNESS
 
 from ..closed_forms.links import Stage, stages
 from ..family import AmplitudeFamily
@@ -26,7 +27,7 @@ Floats = NDArray[np.float64]
 # the bias that follows it exactly hardly differs from the static one, and an actuator whose f0 is a few per
 # cent off does not ring.
 RAMP_PERIODS = 8
-SMOOTHNESS = 5
+QUICK = 5
 NODES = 65
 TOL = 1e-12
 
@@ -126,12 +127,17 @@ class Deflection(AmplitudeFamily):
         return f"{self.device.name} cannot hold this deflection: it lacks volts or depth of the softening well."
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """Every deflection follows one smooth blend; the bias is what the equations ask for on the way."""
-        duration, own = self.ramp_s * self.device.tau_per_s, self._own
-        blend = jets.smoothstep(SMOOTHNESS, NODES, 4)
-        x = np.linspace(0.0, self.ramp_s, NODES)
+        ramp_s, smoothness = (self.ramp_s, QUICK) if length_s is None else (length_s, SMOOTHNESS)
+        duration, own = ramp_s * self.device.tau_per_s, self._own
+        blend = jets.smoothstep(smoothness, NODES, 4)
+        x = np.linspace(0.0, ramp_s, NODES)
         begin, end = (np.array([point.target for point in points])[:, None] for points in (before, after))
         step = (end - begin) * self.device.full_scale
         z, speed, push, jerk = (blend[k][:, None] * math.factorial(k) * duration**-k * step for k in range(4))

@@ -36,6 +36,8 @@ Mask = NDArray[np.bool_]
 PIECE_S = 2.5e-3
 # Where a state magnifies disturbances this much, shorter ones: the line's error is one of them.
 FINE_PIECE_S = 1.5e-3
+# Of a usual ramp: text that scrolls so fast is felt within 0.6 % of its way.
+TRAVEL_SHARE = 0.8
 DELICATE = 1e6
 
 
@@ -66,6 +68,11 @@ class Vibration(AmplitudeFamily):
     def ramp_s(self) -> float:
         """Length of the longest ramps in seconds."""
         return self.band.ramp_s
+
+    @property
+    def shortest_s(self) -> float:
+        """What travels may take less than what is to stand: what each way leaves is judged in every frame."""
+        return TRAVEL_SHARE * self.band.ramp_s
 
     def levels(self, target: Floats, started: bool) -> Floats:
         """A chain rests until its first dot; after it, unraised dots idle near the floor, for fast changes.
@@ -191,7 +198,11 @@ class Vibration(AmplitudeFamily):
         return bool(lam.size and (lam.min() < allowed.min or lam.max() > allowed.max))
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """From rest and to rest along the flat output; between patterns with links that vary in time."""
         chain, band = self.device.chain, self.band
@@ -212,9 +223,9 @@ class Vibration(AmplitudeFamily):
                 for i, ramp in zip(index, ramps, strict=True):
                     out[i] = ramp
 
-        fill(resting & ~stopping, rise, band.rise_s, new)
-        fill(stopping & ~resting, fall, band.ramp_s, old)
-        fill(~resting & ~stopping, change, band.ramp_s, old, new)
+        fill(resting & ~stopping, rise, length_s or band.rise_s, new)
+        fill(stopping & ~resting, fall, length_s or band.ramp_s, old)
+        fill(~resting & ~stopping, change, length_s or band.ramp_s, old, new)
         return self._known(before, after, out)
 
     def _known(

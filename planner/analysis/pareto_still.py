@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chainsim import Device, Outcome
 
-from ..amplitudes.deflection import SMOOTHNESS, Deflection
+from ..amplitudes.deflection import QUICK, Deflection
 from ..operating_point import OperatingPoint
 from ..transitions import jets
 from .effects import Linearisation
@@ -81,5 +81,5 @@ def _scatter(device: Device, state: OperatingPoint) -> float:
 def _at_resonance(periods: float) -> float:
     """How much of a smooth step of that length is at the resonance: |integral of its slope times e^{i tau}|."""
     x = np.linspace(0.0, 1.0, NODES)
-    slope = jets.smoothstep(SMOOTHNESS, NODES, 2)[1]
+    slope = jets.smoothstep(QUICK, NODES, 2)[1]
     return float(abs(np.trapezoid(slope * np.exp(2j * np.pi * periods * x), x)))

@@ -97,13 +97,18 @@ class GridRows(AmplitudeFamily):
         return np.concatenate([right, np.full(span, 0.0 if coupling.lam_y is None else coupling.lam_y.min)], axis=-1)
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         """Every row on its own way, all from one moment on."""
-        old, new = [self._rows(point) for point in before], [self._rows(point) for point in after]
-        ways = self._row.ramps([row for rows in old for row in rows], [row for rows in new for row in rows], moves)
+        old, new = ([row for point in points for row in self._rows(point)] for points in (before, after))
+        ways = self._row.ramps(old, new, moves, length_s)
         per_grid = self.device.rows
-        return [self._together(new[at], ways[at * per_grid : (at + 1) * per_grid]) for at in range(len(after))]
+        each = [slice(at * per_grid, (at + 1) * per_grid) for at in range(len(after))]
+        return [self._together(new[one], ways[one]) for one in each]
 
     def _rows(self, point: OperatingPoint) -> list[OperatingPoint]:
         """The points of the rows that a grid's is made of."""

@@ -31,6 +31,8 @@ SIDE = [k not in (MAIN, MAIN + 1) for k in range(len(ORDERS))]
 # Halvings in the search for the largest amplitude that has an answer; relative deviation of a width or rate that is the
 # same, and how often and how well the width is fitted to a rate.
 HALVINGS, SAME, FITS, FITTED = 5, 0.02, 20, 1e-6
+# In such steps, and so many of them, a quicker rate is looked for that has an answer.
+FASTER, FASTER_TRIES = 1.1, 40
 # Bars narrower than this have tones at lags of nearly 0 and 180 degrees, beyond any lam.
 NARROWEST = 1.01
 
@@ -130,7 +132,8 @@ def _lower(device: Device, level: float, target: WalkingTarget) -> tuple[float, 
 def _lacking(device: Device, target: WalkingTarget, found: TwoToneWave, share: float) -> str:
     if share < 1.0:
         part = f"{100 * share:.0f} % of this amplitude"
-        return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta)"
+        slow = _slowest(device, target)
+        return f"two tones of more than {part} do not stand under one lam; it lacks linearity (a smaller beta){slow}"
     if target.width is not None and abs(found.width / target.width - 1) > SAME:
         return f"its lam makes bars {found.width:.3g} actuators wide; it lacks range of lam"
     rate_hz = found.spacing * device.f0_hz
@@ -140,6 +143,20 @@ def _lacking(device: Device, target: WalkingTarget, found: TwoToneWave, share: f
         return f"bars of this width walk at {rate_hz:.3g} Hz; it lacks a drive for every actuator"
     if found.omega[MAIN] < device.omega.min or found.omega[MAIN + 1] > device.omega.max:
         return f"it takes frequencies outside {device.omega.min:g}..{device.omega.max:g}; it lacks range of omega"
+    return ""
+
+
+def _slowest(device: Device, target: WalkingTarget) -> str:
+    """At which rate bars of this amplitude walk instead, and what lets slower ones pass; empty for a given width."""
+    if target.rate_hz is None or target.width is not None:
+        return ""
+    level, rate_hz = float(target.levels.max()), target.rate_hz
+    for _ in range(FASTER_TRIES):
+        rate_hz *= FASTER
+        found = _found(device, level, replace(target, rate_hz=rate_hz))
+        if found is not None and abs(found.spacing * device.f0_hz / rate_hz - 1) <= SAME:
+            slower = ", slower bars go by its bias (texture scroll)" if device.bias == "actuator" else ""
+            return f"; at this amplitude bars walk at {rate_hz:.3g} Hz{slower}"
     return ""
 
 

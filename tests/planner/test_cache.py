@@ -52,10 +52,10 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
             return plain_states(self, targets, *goals)
 
         def ramps(
-            self: AmplitudeFamily, before: list[OperatingPoint], after: list[OperatingPoint], moves: bool
+            self: AmplitudeFamily, before: list[OperatingPoint], after: list[OperatingPoint], *how: Any
         ) -> list[Ramp | None]:
             done["ramps"] += len(after)
-            return plain_ramps(self, before, after, moves)
+            return plain_ramps(self, before, after, *how)
 
         monkeypatch.setattr(kind, "states", states)
         monkeypatch.setattr(kind, "ramps", ramps)

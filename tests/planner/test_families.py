@@ -95,7 +95,11 @@ class Jumps(PatternFamily):
         ]  # fmt: skip
 
     def ramps(
-        self, before: Sequence[OperatingPoint], after: Sequence[OperatingPoint], moves: bool = True
+        self,
+        before: Sequence[OperatingPoint],
+        after: Sequence[OperatingPoint],
+        moves: bool = True,
+        length_s: float | None = None,
     ) -> list[Ramp | None]:
         return [Ramp(t_s=np.zeros(1)) for _ in after]
 

@@ -39,7 +39,7 @@ from dotwave.studies.sweep import run_sweep
 from drivers import read_exchange, read_waveform, write_exchange
 from drivers.channels import channels_of
 from drivers.formats.samples import writer_for
-from encoders import Frame, GridShape, Scene, TargetPattern, TextSource, TextureError, encode_picture
+from encoders import EncodeError, Frame, GridShape, Scene, TargetPattern, TextSource, encode_picture
 from encoders.picture.limits import PictureLimits
 from planner import Ramp, plan_scene
 from planner.cache import PlanCache, cache_path
@@ -210,8 +210,8 @@ def _job(path: Path) -> None:
     for item in read_job(path).sequence:
         if item.texture is not None:
             # Whoever renders a job says which of its items does not fit the grid.
-            with contextlib.suppress(TextureError):
-                item.texture.target(SHAPE)
+            with contextlib.suppress(EncodeError):
+                next(iter(item.texture.scene(SHAPE).frames))
 
 
 def _sweep(path: Path) -> None:
@@ -276,6 +276,10 @@ FULL_JOB = {
         {"texture": {"wave": {"lag_deg": 60}}}, {"texture": {"bars": {"width": 1, "gap": 1}}},
         {"texture": {"walking_bars": {"width": 2.0}}}, {"texture": {"levels": [[0.1] * 6] * 6}},
         {"texture": {"regions": [{"top": 0, "bottom": 1, "left": 0, "right": 2, "wave": {"lag_deg": 3}}]}},
+        {"texture": {"scroll": {"bars": {"width": 1, "gap": 2}, "columns_per_s": 2.0}, "dwell_s": 2.0}},
+        {"texture": {"scroll": {"text": "a", "columns_per_s": 3.0, "table": "en-ueb-g1.ctb", "cell_gap": 1}}},
+        {"texture": {"dot": {"path": [[0, 0], [2, 3]], "closed": True, "actuators_per_s": 3.0}}},
+        {"texture": {"dot": {"circle": {"radius": 1.0}, "actuators_per_s": 3.0}}},
         {"pause_s": 1.0},
     ],
 }  # fmt: skip

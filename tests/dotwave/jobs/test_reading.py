@@ -183,7 +183,7 @@ def test_textures_are_those_of_the_encoder(tmp_path: Path) -> None:
     assert texture is not None
     shape = GridShape(3, 4)
     wanted = regions(shape, [TextureRegion(0, 2, 1, 3, plane_wave(shape, lag_deg=90))])
-    assert (texture.target(shape).amplitude == wanted.amplitude).all()
+    assert (next(iter(texture.scene(shape).frames)).pattern.amplitude == wanted.amplitude).all()
 
 
 def names_in(schema: dict[str, Any], names: set[str]) -> set[str]:

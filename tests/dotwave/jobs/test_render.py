@@ -40,6 +40,8 @@ def test_there_is_a_job_of_every_kind() -> None:
         "walking_bars:",
         "levels:",
         "regions:",
+        "scroll:",
+        "dot:",
     ):
         assert word in text
 
