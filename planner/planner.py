@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from chainsim import Closure, Device
+from chainsim import Device
 
 from .families import family_of, row_of
 from .family import PatternFamily
@@ -120,7 +120,7 @@ class Planner:
             return joined(rest_for(left, rest_s), entering, before, after)
 
         one_tone = not (before.tones or after.tones) and bool(before.epsilon) and bool(after.epsilon)
-        if one_tone and self.device.chain_length > 1 and self.device.coupling.closure is Closure.OPEN:
+        if one_tone and self.device.chain_length > 1:
             from .transitions.rest_between import rested
 
             return rested(self.device, before, after, whole)

@@ -30,22 +30,21 @@ def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: fl
     moves : where lam may differ on the way from what it is in the end.
     tolerance : of what is waited for where no quick way is found, relative to the largest amplitude.
     """
-    lacking = ""
-    if device.coupling.closure is Closure.OPEN:
-        ramp = find_way(
-            device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
-            limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
-        )  # fmt: skip
-        if not ramp.lacking:
-            return ramp
-        lacking = ramp.lacking
+    if device.chain.spread is not None:
+        return slow_rise(device, point, tolerance)
+    quick = find_way(
+        device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
+        limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
+    )  # fmt: skip
+    if not quick.lacking:
+        return quick
     ramp = slow_rise(device, point, tolerance)
-    return ramp if not (ramp.lacking and lacking) else _lacking(ramp, lacking)
+    return _lacking(ramp, quick.lacking) if ramp.lacking else ramp
 
 
 def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
     """From a wave of one tone to rest, the drive among the ramp's tones."""
-    if device.coupling.closure is not Closure.OPEN:
+    if device.chain.spread is not None:
         return slow_fall(device, point, moves)
     ramp = find_fall(
         device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
