@@ -39,6 +39,11 @@ def _linked(device: Device) -> bool:
     return _single(device) or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN)
 
 
+def _both_ways(device: Device) -> bool:
+    """Whether links act both ways."""
+    return device.coupling.closure is Closure.BIDIRECTIONAL
+
+
 def _any(device: Device) -> bool:
     return True
 
@@ -47,6 +52,7 @@ def _any(device: Device) -> bool:
 FAMILIES = (
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
+    Row("both ways", (AmplitudeTarget, WaveTarget), _both_ways, ".waves.both_ways_family", "BothWays"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
     Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
     Row("wave", (WaveTarget, AmplitudeTarget), _any, ".waves.wave_state", "Waves"),

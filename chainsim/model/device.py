@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ..equations.chain import Chain
-from ..equations.coupling import Closure, law_of
+from ..equations.coupling import Closure
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
@@ -62,8 +62,6 @@ class Coupling(_Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Coupling:
-        if not law_of(self.closure).plain:
-            raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
         if self.scope == "none" and self.lam.max > 0:
             raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
         if self.scope == "fixed" and self.lam.min != self.lam.max:

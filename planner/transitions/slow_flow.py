@@ -1,9 +1,9 @@
 """The slow flow of a chain under drive and links that vary, many drives at once.
 
 With z_m = Re(A_m e^{i omega tau}), a stage of an open chain obeys ``A'' + D A' + K A = F`` with
-``D = 2 i omega + delta``, ``K = 1 - omega^2 + i delta omega + lam + (3/4) beta |A|^2 + (3/128) beta^2 |A|^4`` (the last term is the third
-harmonic's way back) and ``F = lam A_{m-1}``, or the drive. The chain's law says what else pulls at it, in a ring or
-from behind. Second order: A'' is the derivative of the first order, ``A' = (F - K A) / D``.
+``D = 2 i omega + delta``, ``K = 1 - omega^2 + i delta omega + lam + (3/4) beta |A|^2 + (3/128) beta^2 |A|^4`` (the
+last term is the third harmonic's way back) and ``F = lam A_{m-1}``, or the drive. The chain's law says what else pulls
+at it, in a ring or from behind. Second order: A'' is the derivative of the first order, ``A' = (F - K A) / D``.
 """
 
 from __future__ import annotations

@@ -10,9 +10,11 @@ from ..margins import WELL_SHARE
 from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .fall import find_fall
+from .flat_way import flat_fall, flat_rise
 from .joining import as_tone
 from .limits import WayLimits
 from .rise import find_way
+from .search import STRONG
 from .slow import slow_fall, slow_rise
 from .tones import quick_rise
 
@@ -32,6 +34,10 @@ def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: fl
     """
     if device.chain.spread is not None:
         return slow_rise(device, point, tolerance)
+    if device.chain.law.both_ways:
+        flat = flat_rise(device, point, limits_of(device, moves))
+        if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
+            return slow_rise(device, point, tolerance) if flat is None else flat
     quick = find_way(
         device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
@@ -46,6 +52,10 @@ def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
     """From a wave of one tone to rest, the drive among the ramp's tones."""
     if device.chain.spread is not None:
         return slow_fall(device, point, moves)
+    if device.chain.law.both_ways:
+        flat = flat_fall(device, point, limits_of(device, moves))
+        if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
+            return slow_fall(device, point, moves) if flat is None else as_tone(flat, point.omega)
     ramp = find_fall(
         device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,

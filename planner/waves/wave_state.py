@@ -19,6 +19,7 @@ from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
 from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
 from ..transitions.waves import enter_wave, leave_wave
+from .both_ways import BothWaysFit
 from .wave_fit import GOOD, WaveFit
 
 __all__ = ["Waves", "wave_state"]
@@ -72,7 +73,7 @@ def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
     Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
     nearest motion of all.
     """
-    task = WaveFit(device, target)
+    task = (BothWaysFit if device.chain.law.both_ways else WaveFit)(device, target)
     found, share = task.best(1.0), 1.0
     near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
     if not task.stands(found) and not near and not task.jagged:
@@ -126,7 +127,7 @@ class _Told:
 
     def _lacking(self, error: float, noise: float) -> str:
         """One clause on what keeps the device from the target, "" when nothing."""
-        task, found, scale = self.task, self.found, self.task.scale
+        task, device, found, scale = self.task, self.task.device, self.found, self.task.scale
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
             return (
@@ -143,7 +144,8 @@ class _Told:
             return "waves travel away from a drive, lagging by 0 to 180 degrees; it lacks a drive for every actuator"
         if found.outcome is not Outcome.OK:
             return "nothing near it is stable; it lacks damping, or linearity (a smaller beta)"
-        return self._out_of_range() or self._no_freedom()
+        # Where links act both ways the nearest may lie anywhere, and more range would bring it no nearer.
+        return ("" if device.chain.law.both_ways else self._out_of_range()) or self._no_freedom()
 
     def _uneven(self) -> bool:
         """Whether neighbours are to differ as one lam and one drive never let them."""
