@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import ActuatorSpread, Chain, Closure, HigherMode, Surroundings
+from chainsim import ActuatorSpread, Chain, HigherMode, Surroundings
 
+from ..drive import closed
 from ..operating_point import OperatingPoint, PointTone
 
 __all__ = ["Linearisation", "pattern_error"]
@@ -43,8 +44,7 @@ class Linearisation:
     @cached_property
     def lam(self) -> Floats:
         """Links, float64, shape (n,); the first closes a ring and is 0 otherwise."""
-        closing = self.point.lam[:1] if self.chain.closure is Closure.RING else np.zeros(1)
-        return np.concatenate([closing, self.point.lam])
+        return closed(self.chain, self.point.lam)
 
     @cached_property
     def lines(self) -> tuple[PointTone, ...]:
@@ -70,17 +70,22 @@ class Linearisation:
 
     def electric(self, line: PointTone) -> Complexes:
         """Force through the piezo of each actuator: drive, bias, and what its link brings; complex128, shape (n,)."""
-        force = self.lam * (np.roll(line.phasor, 1) - line.phasor)
+        force = self._linked(line.phasor)
         force[0] += line.epsilon
         return force + (self.point.bias if line.omega == 0 else 0.0)
 
     def impedance(self, omega: float, stiffening: Floats | float = 0.0) -> Complexes:
         """Linear equations ``impedance @ A = force`` at a frequency, links in; complex128, shape (n, n)."""
         chain, n = self.chain, self.chain.n
-        own = chain.stiffness + self.lam + stiffening - omega**2 + 1j * chain.deltas * omega
+        own = chain.stiffness + stiffening - omega**2 + 1j * chain.deltas * omega
         matrix: Complexes = np.diag(np.broadcast_to(own, (n,)).astype(np.complex128))
-        matrix[np.arange(n), np.arange(n) - 1] -= self.lam
-        return matrix
+        return np.asarray(matrix + chain.law.matrix(self.lam[None, :], None)[0])
+
+    def _linked(self, phasor: Complexes) -> Complexes:
+        """What the links do to each actuator of a motion; complex128, shape (n,)."""
+        force = np.zeros(self.chain.n, dtype=np.complex128)
+        self.chain.law.pull(force, phasor.astype(np.complex128), self.lam)
+        return force
 
     def moved(self, line: PointTone, force: Complexes) -> Complexes:
         """How a line changes under further forces of shape (n,) or (n, k), to first order; complex128, same shape."""
@@ -164,7 +169,7 @@ class Linearisation:
         for line in self.lines:
             pliant = sum(one.gain / (one.omega**2 - line.omega**2 + 1j * one.delta * line.omega) for one in modes)
             tip = pliant * self.electric(line)
-            found.append(tip + self.moved(line, self.lam * (np.roll(tip, 1) - tip)))
+            found.append(tip + self.moved(line, self._linked(tip)))
         return found
 
     def pulled(self, row_lam: float, above: Linearisation) -> list[Complexes]:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 
-from chainsim import Outcome, load_device
-from planner.operating_point import OperatingPoint
+from chainsim import Outcome, balance_near, load_device
+from planner.operating_point import OperatingPoint, setting_of
 from planner.targets import WaveTarget
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.wave_fit import GOOD
+from planner.waves.wave_forms import wave_for
 from planner.waves.wave_state import wave_state
 from tests.support.joint_motion import Step, felt_after
 
@@ -24,6 +25,46 @@ def slow(*values: float) -> ParameterSet:
 def wave(lag_deg: float, level: float) -> OperatingPoint:
     phase = np.angle(np.exp(-1j * np.radians(lag_deg) * np.arange(6)))
     return wave_state(RING, WaveTarget.of(np.full(6, level), phase, np.ones(6)))
+
+
+# Of docs/theory.md section 3: lags, and the largest level at which each is stable.
+MAP = {65: 0.78, 70: 0.88, 80: 0.64, 100: 0.94, 110: 0.56, 115: 0.38}
+
+
+def stable(lag_deg: float, level: float) -> bool:
+    """Whether a ring's wave is an orbit of the full equations whose multipliers lie within the circle."""
+    chain, amplitude = RING.chain, level * RING.full_scale
+    point = wave_for(chain, amplitude=amplitude, lag=np.radians(lag_deg))
+    phasor = amplitude * np.exp(-1j * np.radians(lag_deg) * np.arange(6))
+    found = balance_near(chain, setting_of(chain, [point]), phasor[None], tol=1e-9)
+    assert np.abs(found.phasor[0] - phasor).max() < 0.02 * amplitude
+    return bool(found.stable[0])
+
+
+@pytest.mark.parametrize(("lag_deg", "level"), MAP.items())
+def test_the_map_of_stable_waves(lag_deg: float, level: float) -> None:
+    assert stable(lag_deg, 0.9 * level)
+    assert not stable(lag_deg, 1.1 * level)
+
+
+def test_what_the_map_leaves_out() -> None:
+    # 90 degrees are stable far above full scale, and nothing is below 60 or above 120 degrees.
+    assert stable(90, 1.0)
+    assert not stable(55, 0.05)
+    assert not stable(125, 0.05)
+    # A mode of the ring itself takes no drive.
+    for lag in (60, 120):
+        assert abs(wave_for(RING.chain, amplitude=0.02, lag=np.radians(lag)).epsilon) < 1e-15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lag_deg", "level"), MAP.items())
+def test_every_wave_of_the_map_stands_within_a_second(lag_deg: float, level: float) -> None:
+    held = wave(lag_deg, 0.8 * level)
+    assert held.outcome is Outcome.OK
+    way_in = enter_wave(RING, held, True, GOOD)
+    assert way_in.lacking == ""
+    assert way_in.duration_s < 1.0
 
 
 @pytest.mark.parametrize(("lag_deg", "level"), [(90, 1.0), slow(75, 0.3), slow(105, 0.3)])
