@@ -137,6 +137,7 @@ from .scene import (
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,
+    UnlockedBeats as UnlockedBeats,
     WalkingBars as WalkingBars,
 )
 from .sets import (
@@ -155,5 +156,6 @@ from .textures import (
     levels as levels,
     plane_wave as plane_wave,
     regions as regions,
+    unlocked as unlocked,
     walking_bars as walking_bars,
 )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from chainsim import Closure, Device
 
 from .family import PatternFamily
-from .targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget
+from .targets import AmplitudeTarget, ChainTarget, UnlockedTarget, WalkingTarget, WaveTarget
 
 __all__ = ["FAMILIES", "Row", "family_of", "row_of"]
 
@@ -55,6 +55,7 @@ FAMILIES = (
     Row("both ways", (AmplitudeTarget, WaveTarget), _both_ways, ".waves.both_ways_family", "BothWays"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
     Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
+    Row("unlocked", (UnlockedTarget,), _any, ".waves.unlocked", "Unlocked"),
     Row("wave", (WaveTarget, AmplitudeTarget), _any, ".waves.wave_state", "Waves"),
 )
 

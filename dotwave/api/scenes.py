@@ -114,13 +114,14 @@ def text(
 def texture(
     kind: Mapping[str, Any] | TargetPattern, device: AnyDevice = USUAL_DEVICE, *, dwell_s: float = 2.0
 ) -> Scene:
-    """One pattern: a wave, bars, walking bars, levels, or regions of them.
+    """One pattern: a wave, bars, walking bars, beats of a ring, levels, or regions of waves and bars.
 
     Parameters
     ----------
     kind : mapping or encoders.TargetPattern
         As the key `texture` of a job file: ``{"wave": {"lag_deg": 60}}``, ``{"bars": {"width": 1, "gap": 1}}``,
-        ``{"walking_bars": {"rate_hz": 3}}``, ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row).
+        ``{"walking_bars": {"rate_hz": 3}}``, ``{"unlocked": {"depth": 0.3, "period_s": 1.6}}``,
+        ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row).
     device : Device, name, file or mapping
         Whose grid it covers.
     dwell_s : float

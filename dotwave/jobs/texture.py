@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
 
-from encoders import GridShape, Region, TargetPattern, bars, levels, plane_wave, regions, walking_bars
+from encoders import GridShape, Region, TargetPattern, bars, levels, plane_wave, regions, unlocked, walking_bars
 
 __all__ = ["NotNegative", "Part", "Positive", "Seconds", "TexturePart"]
 
@@ -73,6 +73,13 @@ class Walking(Part):
         return self
 
 
+class Unlocked(Part):
+    """A motion that never settles (`encoders.unlocked`)."""
+
+    depth: Annotated[float, Field(gt=0, le=1)]
+    period_s: Positive
+
+
 class RegionPart(Part):
     """A wave or bars on the rows `top` to `bottom` - 1 and the columns `left` to `right` - 1, counted from 0."""
 
@@ -96,6 +103,7 @@ class TexturePart(Part):
     wave: WavePart | None = None
     bars: Bars | None = None
     walking_bars: Walking | None = None
+    unlocked: Unlocked | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
     dwell_s: Seconds = 2.0
@@ -103,7 +111,7 @@ class TexturePart(Part):
     @model_validator(mode="after")
     def _one(self) -> TexturePart:
         if sum(value is not None for name, value in self if name != "dwell_s") != 1:
-            raise ValueError("give exactly one of wave, bars, walking_bars, levels, regions")
+            raise ValueError("give exactly one of wave, bars, walking_bars, unlocked, levels, regions")
         return self
 
     @property
@@ -121,6 +129,8 @@ class TexturePart(Part):
         """
         if self.walking_bars is not None:
             return walking_bars(shape, **self.walking_bars.model_dump())
+        if self.unlocked is not None:
+            return unlocked(shape, **self.unlocked.model_dump())
         if self.levels is not None:
             return levels(self.levels)
         if self.regions is not None:

@@ -59,6 +59,8 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
+    beats : for each row depth and period in seconds of a motion that never settles, None where it does; empty where all
+        rows do. Their targets are the loudest that passes by.
     goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     """
 
@@ -78,6 +80,7 @@ class FrameMark:
     wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
     number: PageNumber | None = None
+    beats: tuple[tuple[float, float] | None, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,7 @@ class _Frame(_Part):
     moving: list[bool] | None = None
     goes_on: list[_GoesOn] = []
     number: _PageNumber | None = None
+    beats: list[Annotated[list[Positive], Field(min_length=2, max_length=2)] | None] | None = None
 
 
 class _Heading(_Part):
@@ -213,7 +214,7 @@ class _Check:
             self._refuse(f"{place}.omega", f"expected {rows} numbers, one for each row, got {len(frame.omega)}")
         if len(frame.target) != rows or any(len(row) != cols for row in frame.target):
             self._refuse(f"{place}.target", f"expected {rows} rows of {cols} numbers")
-        for name, value in (("tones", frame.tones), ("moving", frame.moving)):
+        for name, value in (("tones", frame.tones), ("moving", frame.moving), ("beats", frame.beats)):
             if value is not None and len(value) != rows:
                 self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
         for name, grid in (("wish", frame.wish), ("phase", frame.phase)):
@@ -270,6 +271,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
         number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
+        beats=tuple(None if one is None else (one[0], one[1]) for one in frame.beats or ()),
     )
 
 
