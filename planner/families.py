@@ -39,9 +39,12 @@ def _linked(device: Device) -> bool:
     return _single(device) or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN)
 
 
-def _both_ways(device: Device) -> bool:
-    """Whether links act both ways."""
-    return device.coupling.closure is Closure.BIDIRECTIONAL
+def _joint(device: Device) -> bool:
+    """Whether links act both ways, or rings have a lam on every link."""
+    coupling = device.coupling
+    return coupling.closure is Closure.BIDIRECTIONAL or (
+        coupling.closure is Closure.RING and coupling.scope == "link" and not _single(device)
+    )
 
 
 def _any(device: Device) -> bool:
@@ -52,7 +55,7 @@ def _any(device: Device) -> bool:
 FAMILIES = (
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
-    Row("both ways", (AmplitudeTarget, WaveTarget), _both_ways, ".waves.both_ways_family", "BothWays"),
+    Row("joint", (AmplitudeTarget, WaveTarget), _joint, ".waves.joint", "Joint"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
     Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
     Row("unlocked", (UnlockedTarget,), _any, ".waves.unlocked", "Unlocked"),

@@ -34,7 +34,7 @@ def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: fl
     """
     if device.chain.spread is not None:
         return slow_rise(device, point, tolerance)
-    if device.chain.law.both_ways:
+    if _flat(device):
         flat = flat_rise(device, point, limits_of(device, moves))
         if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
             return slow_rise(device, point, tolerance) if flat is None else flat
@@ -52,7 +52,7 @@ def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
     """From a wave of one tone to rest, the drive among the ramp's tones."""
     if device.chain.spread is not None:
         return slow_fall(device, point, moves)
-    if device.chain.law.both_ways:
+    if _flat(device):
         flat = flat_fall(device, point, limits_of(device, moves))
         if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
             return slow_fall(device, point, moves) if flat is None else as_tone(flat, point.omega)
@@ -61,6 +61,11 @@ def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
     )  # fmt: skip
     return as_tone(ramp, point.omega)
+
+
+def _flat(device: Device) -> bool:
+    """Whether links may be strong in a chain whose actuators act on each other."""
+    return device.chain.law.both_ways or (device.chain.law.closed and device.coupling.scope == "link")
 
 
 def enter_tones(device: Device, point: OperatingPoint, moves: bool, tolerance: float) -> Ramp:

@@ -164,9 +164,9 @@ def _tried(device: Device, point: OperatingPoint, target: UnlockedTarget) -> Ope
     off = max(abs(depth - target.depth) / DEPTH_OFF, abs(period_s / target.period_s - 1) / PERIOD_OFF)
     nearest = f"the nearest found beats {depth:.2g} deep every {period_s:.2g} s; it lacks other actuators"
     lacking = lacking_of(margins) or ("" if off <= SURE else nearest)
-    n = device.chain_length
+    n, loud = device.chain_length, (beats.loud * device.full_scale).astype(np.complex128)
     return replace(
-        point, phasor=beats.loud * device.full_scale + 0j, mean=np.zeros(n), bias=np.zeros(n), target=beats.loud,
+        point, phasor=loud, mean=np.zeros(n), bias=np.zeros(n), target=beats.loud,
         margins=margins, beats=(target.depth, target.period_s), error=0.0 if off <= SURE else off * DEPTH_OFF,
         outcome=Outcome.UNREACHABLE if lacking else Outcome.OK, lacking=lacking,
     )  # fmt: skip

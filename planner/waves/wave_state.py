@@ -19,7 +19,7 @@ from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
 from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
 from ..transitions.waves import enter_wave, leave_wave
-from .both_ways import BothWaysFit
+from .joint_fit import JointFit
 from .wave_fit import GOOD, WaveFit
 
 __all__ = ["Waves", "wave_state"]
@@ -73,13 +73,19 @@ def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
     Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
     nearest motion of all.
     """
-    task = (BothWaysFit if device.chain.law.both_ways else WaveFit)(device, target)
+    task = (JointFit if _joint(device, target) else WaveFit)(device, target)
     found, share = task.best(1.0), 1.0
     near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
     if not task.stands(found) and not near and not task.jagged:
         lower = task.lower()
         share, found = (1.0, found) if lower is None else lower
     return _Told(task, found, share).state()
+
+
+def _joint(device: Device, target: WaveTarget) -> bool:
+    """Whether closed forms of waves do not say it: links act both ways, or each of a ring is for amplitudes alone."""
+    linked = device.chain.law.closed and device.coupling.scope == "link"
+    return device.chain.law.both_ways or (linked and int(np.count_nonzero(~np.isnan(target.phases))) <= 1)
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,7 @@ class _Told:
 
     def _lacking(self, error: float, noise: float) -> str:
         """One clause on what keeps the device from the target, "" when nothing."""
-        task, device, found, scale = self.task, self.task.device, self.found, self.task.scale
+        task, found, scale = self.task, self.found, self.task.scale
         if task.stands(found) and self.share == 1.0:
             small = error <= 2 * GOOD * scale
             return (
@@ -144,8 +150,8 @@ class _Told:
             return "waves travel away from a drive, lagging by 0 to 180 degrees; it lacks a drive for every actuator"
         if found.outcome is not Outcome.OK:
             return "nothing near it is stable; it lacks damping, or linearity (a smaller beta)"
-        # Where links act both ways the nearest may lie anywhere, and more range would bring it no nearer.
-        return ("" if device.chain.law.both_ways else self._out_of_range()) or self._no_freedom()
+        # Where actuators act on each other the nearest may lie anywhere, and more range would bring it no nearer.
+        return ("" if isinstance(task, JointFit) else self._out_of_range()) or self._no_freedom()
 
     def _uneven(self) -> bool:
         """Whether neighbours are to differ as one lam and one drive never let them."""

@@ -12,8 +12,8 @@ from dotwave.verification import verify
 from drivers import write_waveform
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
-from planner.closed_forms.both_ways import links_between, links_both_ways
 from planner.closed_forms.joint import driven, growth, sensitivity
+from planner.closed_forms.joint_links import links_between, links_both_ways
 from planner.drive import closed
 from planner.operating_point import OperatingPoint
 from planner.planner import Planner

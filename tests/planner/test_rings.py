@@ -7,15 +7,17 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from chainsim import Outcome, balance_near, load_device
+from planner.closed_forms.joint_links import links_round
 from planner.operating_point import OperatingPoint, setting_of
-from planner.targets import WaveTarget
+from planner.planner import Planner
+from planner.targets import AmplitudeTarget, WaveTarget
 from planner.transitions.waves import enter_wave, leave_wave
 from planner.waves.wave_fit import GOOD
 from planner.waves.wave_forms import wave_for
 from planner.waves.wave_state import wave_state
 from tests.support.joint_motion import Step, felt_after
 
-RING = load_device("paper-6x6-ring")
+RING, LINKED = load_device("paper-6x6-ring"), load_device("linked-ring-6x6")
 
 
 def slow(*values: float) -> ParameterSet:
@@ -81,3 +83,30 @@ def test_a_wave_stands_within_a_second_and_is_gone_in_two(lag_deg: float, level:
     # From the first period on: amplitudes and lags alike.
     assert np.abs(standing - held.phasor).max() < 1e-3 * scale
     assert np.abs(gone).max() < 1.1e-3 * scale
+
+
+def test_programmable_links_hold_dots_on_a_ring_where_it_stays_stable() -> None:
+    family = Planner(LINKED, 20.0)
+    targets = [AmplitudeTarget.of(np.array(list(row), dtype=np.float64)) for row in ("100100", "000100")]
+    held, refused = (family.points([family.held(target, False)])[0] for target in targets)
+    assert (held.outcome, refused.outcome) == (Outcome.OK, Outcome.UNREACHABLE)
+    assert 0 < held.margins.multiplier < 1
+    assert refused.lacking
+    way_in = enter_wave(LINKED, held, True, GOOD)
+    assert way_in.lacking == ""
+    assert way_in.duration_s < 1.0
+    (standing,) = felt_after(LINKED, [Step(way_in, held, 0.2)])
+    felt = np.abs(standing) / LINKED.full_scale
+    assert np.abs(felt - held.target).max() < 1.5e-3
+    assert np.abs(felt[:, [0, 3]] - 1).max() < 1.5e-3
+    assert felt[:, [1, 2, 4, 5]].max() < 0.102
+
+
+def test_links_round_a_ring_are_those_of_its_balance() -> None:
+    chain, omega = LINKED.chain, 1.03
+    held = links_round(chain, 0.05 * np.array([[1.0, 0.1, 0.1, 1.0, 0.05, 0.05]]), omega, 1.0)
+    (lam,), (phasor,), (epsilon,) = held.lam, held.phasor, held.epsilon
+    stage = 1 - omega**2 + 0.75 * chain.beta * np.abs(phasor) ** 2 + 1j * chain.delta * omega
+    whole = np.concatenate([lam[:1], lam])
+    asked = stage * phasor - whole * (np.roll(phasor, 1) - phasor)
+    np.testing.assert_allclose(asked, [epsilon, 0, 0, 0, 0, 0], atol=1e-13)

@@ -1,6 +1,7 @@
-"""Closed forms of a chain whose links act both ways: which links hold amplitudes, and which amplitudes can be held.
+"""Closed forms of chains whose oscillators act on each other: which links hold amplitudes, and which can be held.
 
-With ``s_m = kappa_m + i delta omega`` (theory.md section 2.1) the balance of oscillator m is
+Links of a ring are those of an open chain, whose drive the closing link adds to. Where links act both ways, with
+``s_m = kappa_m + i delta omega`` (theory.md section 2.1) the balance of oscillator m is
 ``s_m A_m = lam_m (A_{m-1} - A_m) - lam_{m+1} (A_m - A_{m+1})``. Summed from m to the end,
 
     lam_m (A_{m-1} - A_m) = J_m,    J_m = s_m A_m + ... + s_n A_n,
@@ -18,9 +19,9 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from .links import stage_constant, stages
+from .links import links_for, stage_constant, stages
 
-__all__ = ["Held", "links_between", "links_both_ways"]
+__all__ = ["Held", "links_between", "links_both_ways", "links_round"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -42,6 +43,26 @@ class Held(NamedTuple):
     lam: Floats
     phasor: Complexes
     epsilon: Complexes
+
+    def part(self, at: Wholes | NDArray[np.bool_]) -> Held:
+        """Some of them."""
+        return Held(self.profile[at], self.lam[at], self.phasor[at], self.epsilon[at])
+
+
+def links_round(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> Held:
+    """The links up to `lam_max` of a ring that hold profiles of amplitudes; as `links_both_ways`.
+
+    The closing link is set like the first.
+    """
+    lam = links_for(chain, amplitude, omega)
+    profile = np.flatnonzero(np.isfinite(lam).all(axis=1) & (lam.max(axis=1) <= lam_max))
+    lam, here = lam[profile], amplitude[profile]
+    stage = stage_constant(chain, here, omega) + 1j * stages(chain).delta * omega
+    phasor = here.astype(np.complex128)
+    for m in range(chain.n - 1, 0, -1):
+        phasor[:, m - 1] = phasor[:, m] * (1 + stage[:, m] / lam[:, m - 1])
+    epsilon = stage[:, 0] * phasor[:, 0] - lam[:, 0] * (phasor[:, -1] - phasor[:, 0])
+    return Held(profile, lam, phasor, epsilon)
 
 
 def links_both_ways(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> Held:

@@ -1,4 +1,4 @@
-"""What chains hold whose links act both ways."""
+"""What chains hold whose actuators act on each other."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from chainsim import Device
 from ..family import PatternFamily
 from ..operating_point import OperatingPoint
 from ..targets import ChainTarget, WaveTarget
-from .both_ways import with_floor
+from .joint_fit import with_floor
 from .wave_state import Waves
 
-__all__ = ["BothWays"]
+__all__ = ["Joint"]
 
 
-class BothWays(Waves):
+class Joint(Waves):
     """Waves and amplitudes; with a lam on every link flat dots idle where the links hold them."""
 
     def __init__(self, device: Device, contrast_db: float) -> None:
@@ -34,8 +34,8 @@ class BothWays(Waves):
         return cls(device, contrast_db)
 
     def _point(self, target: ChainTarget) -> OperatingPoint:
-        linked = isinstance(target, WaveTarget) and self.device.coupling.scope == "link"
-        if linked and np.count_nonzero(~np.isnan(target.phases)) <= 1:
+        linked = self.device.coupling.scope == "link"
+        if linked and isinstance(target, WaveTarget) and np.count_nonzero(~np.isnan(target.phases)) <= 1:
             floor = with_floor(self.device, target.levels, self._contrast_db)
             target = replace(target, amplitude=tuple(floor.tolist()))
         return super()._point(target)

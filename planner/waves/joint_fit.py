@@ -1,4 +1,4 @@
-"""Patterns on chains whose links act both ways: one drive and the links, in closed form, then fitted."""
+"""Patterns on chains whose actuators act on each other: one drive and the links, in closed form, then fitted."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from chainsim import Device
 
-from ..closed_forms.both_ways import Held, links_between, links_both_ways
 from ..closed_forms.joint import driven, growth, sensitivity
+from ..closed_forms.joint_links import links_between, links_both_ways, links_round
 from ..closed_forms.wave_fit import FittedPoint, Freedom, MotionTarget, fit
 from ..drive import closed
 from ..operating_point import OperatingPoint
 from .wave_fit import WaveFit
 
-__all__ = ["BothWaysFit", "with_floor"]
+__all__ = ["JointFit", "with_floor"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -51,8 +51,8 @@ class _Guess(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BothWaysFit(WaveFit):
-    """The task for one target on one device whose links act both ways."""
+class JointFit(WaveFit):
+    """The task for one target on a device whose links act both ways, or whose rings have a lam on every link."""
 
     @cached_property
     def backwards(self) -> bool:
@@ -127,12 +127,13 @@ def _frequencies(device: Device) -> Floats:
 def _by_links(device: Device, amplitude: Floats) -> list[_Guess]:
     """At every frequency the best settings whose links hold one of the profiles, shape (P, n), or come near."""
     chain, found = device.chain, list[_Guess]()
+    links = links_both_ways if chain.law.both_ways else links_round
     # What is exactly still cannot be passed through.
     amplitude = np.maximum(amplitude, 1e-3 * amplitude.max(axis=1, keepdims=True))
     for omega in _frequencies(device).tolist():
-        held = links_both_ways(chain, amplitude, omega, device.coupling.lam.max)
+        held = links(chain, amplitude, omega, device.coupling.lam.max)
         inside = (held.lam >= device.coupling.lam.min).all(axis=1) & (np.abs(held.epsilon) <= device.epsilon_max)
-        held = Held(*(one[inside] for one in held))
+        held = held.part(inside)
         if not len(held.profile):
             continue
         scale = amplitude[held.profile].max(axis=1)
