@@ -112,6 +112,10 @@ from .scene_plan import (
     kept_share as kept_share,
     plan_scene as plan_scene,
 )
+from .waves.beats import (
+    beats_of as beats_of,
+    beats_off as beats_off,
+)
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
 )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["DEPTH_OFF", "PERIOD_OFF", "Beats", "beats_of"]
+__all__ = ["DEPTH_OFF", "Beats", "beats_of", "beats_off"]
 
 Floats = NDArray[np.float64]
 
@@ -48,3 +48,8 @@ def beats_of(amplitude: Floats, step_s: float) -> Beats:
     near = np.abs(np.arange(len(power)).reshape(-1, *[1] * (power.ndim - 1)) - at) <= 2 * FINER
     share = (power * near).sum(axis=0) / np.maximum(power.sum(axis=0), 1e-300)
     return Beats(loud, depth, FINER * count * step_s / np.maximum(at, 1), share)
+
+
+def beats_off(found: Beats, depth: float, period_s: float) -> Floats:
+    """How far depth and period are off, the worse of both; 1 is as far as they may be."""
+    return np.maximum(np.abs(found.depth - depth) / DEPTH_OFF, np.abs(found.period_s / period_s - 1) / PERIOD_OFF)

@@ -20,7 +20,7 @@ from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
 from ..targets import ChainTarget, UnlockedTarget
 from ..transitions.slow import slow_fall
-from .beats import DEPTH_OFF, PERIOD_OFF, Beats, beats_of
+from .beats import DEPTH_OFF, Beats, beats_of, beats_off
 
 __all__ = ["Unlocked"]
 
@@ -63,7 +63,7 @@ class Unlocked(RisingFamily):
         points, beats = self._known
         if not points:
             return _nothing(device, target, "no drive was found under which it does not lock; it lacks range of lam")
-        away = [max(_away(target, beats, at)) for at in range(len(points))]
+        away = beats_off(beats, target.depth, target.period_s)
         found = list[OperatingPoint]()
         for at in np.argsort(away, kind="stable")[:TRIED].tolist():
             found.append(_tried(device, points[at], target))
@@ -131,12 +131,6 @@ def _followed(device: Device, points: Sequence[OperatingPoint], step: float) -> 
     return np.array(looks)
 
 
-def _away(target: UnlockedTarget, beats: Beats, at: int) -> tuple[float, float]:
-    """Depth and period off, each in units of what it may be."""
-    period = abs(float(beats.period_s[at]) / target.period_s - 1) / PERIOD_OFF
-    return abs(float(beats.depth[at]) - target.depth) / DEPTH_OFF, period
-
-
 def _rise(device: Device, point: OperatingPoint) -> Ramp:
     x = np.linspace(0.0, 1.0, 33)
     step, (rise, before) = smooth_step(x), (2 * math.pi / device.delta * np.array([RISE, BEFORE]))
@@ -161,7 +155,7 @@ def _tried(device: Device, point: OperatingPoint, target: UnlockedTarget) -> Ope
         volts=abs(point.epsilon) / device.epsilon_max, well=float(np.abs(z).max()) / device.escape_amplitude,
         slew=slew_of(device, abs(point.epsilon), point.omega),
     )  # fmt: skip
-    off = max(abs(depth - target.depth) / DEPTH_OFF, abs(period_s / target.period_s - 1) / PERIOD_OFF)
+    off = float(beats_off(beats, target.depth, target.period_s))
     nearest = f"the nearest found beats {depth:.2g} deep every {period_s:.2g} s; it lacks other actuators"
     lacking = lacking_of(margins) or ("" if off <= SURE else nearest)
     n, loud = device.chain_length, (beats.loud * device.full_scale).astype(np.complex128)
