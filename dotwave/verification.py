@@ -25,6 +25,7 @@ from encoders import (
     read_page,
 )
 
+from .beating import Envelope
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
 
@@ -183,6 +184,10 @@ class _Fit:
         self._gram = [np.zeros((size, size)) for size in sizes]
         self._load = [np.zeros((size, device.cols)) for size in sizes]
         self._squares = np.zeros((device.rows, device.cols))
+        self._envelopes = {
+            row: Envelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
+            for row, beats in enumerate(mark.beats) if beats is not None
+        }  # fmt: skip
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
@@ -190,6 +195,8 @@ class _Fit:
             self._passing.take(index, z)
         inside = slice(*np.searchsorted(index, [self.first, self.stop]))
         tau = index[inside] / self._rate_hz * self._device.tau_per_s
+        for row, envelope in self._envelopes.items():
+            envelope.take(index[inside] / self._rate_hz - self.first / self._rate_hz, z[inside, row])
         for row, rates in enumerate(self._rates):
             if row == 0 or rates != self._rates[row - 1]:
                 waves = (wave(rate * tau) for rate in rates for wave in (np.cos, np.sin))
@@ -222,6 +229,8 @@ class _Fit:
         # Without a bias nothing but a motion can be felt of a row that is to stand still.
         level = np.where((standing & (self._device.bias == "actuator"))[:, np.newaxis], still, moving)
         worst[standing] = np.abs(level - mark.target)[standing]
+        for row, envelope in self._envelopes.items():
+            level[row], worst[row] = envelope.judged(mark.target[row] * full, mark.beats[row] or (0.0, 1.0), full)
         way = None if self._passing is None else self._passing.error()
         return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)), way)
 

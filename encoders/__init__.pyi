@@ -140,6 +140,7 @@ from .scene import (
     PatternKind as PatternKind,
     Scene as Scene,
     TargetPattern as TargetPattern,
+    UnlockedBeats as UnlockedBeats,
     WalkingBars as WalkingBars,
 )
 from .sets import (
@@ -160,6 +161,7 @@ from .textures import (
     regions as regions,
     rings as rings,
     slanted_bars as slanted_bars,
+    unlocked as unlocked,
     walking_bars as walking_bars,
 )
 from .travel import (

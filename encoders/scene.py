@@ -63,6 +63,20 @@ class WalkingBars:
 
 
 @dataclass(frozen=True)
+class UnlockedBeats:
+    """A motion that never settles, felt as beats.
+
+    Attributes
+    ----------
+    depth : (loud - soft) / (loud + soft) of the amplitude, 0 to 1.
+    period_s : of the beats, seconds.
+    """
+
+    depth: float
+    period_s: float
+
+
+@dataclass(frozen=True)
 class TargetPattern:
     """A wish for one moment.
 
@@ -74,6 +88,7 @@ class TargetPattern:
     phase_matters : whether the arguments of `amplitude` are part of the wish.
     any_phase : bool, shape (rows, cols), where they are not although `phase_matters`; None means nowhere.
     walking : the amplitude is the largest that passes by, in bars that walk; None for what stands.
+    unlocked : it never settles, and beats like this, as loud as it comes; None for what settles.
     """
 
     amplitude: NDArray[np.complex128]
@@ -82,6 +97,7 @@ class TargetPattern:
     phase_matters: bool = False
     walking: WalkingBars | None = None
     any_phase: NDArray[np.bool_] | None = None
+    unlocked: UnlockedBeats | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import EncodeError
-from .scene import GridShape, PatternKind, TargetPattern, WalkingBars
+from .scene import GridShape, PatternKind, TargetPattern, UnlockedBeats, WalkingBars
 
 __all__ = [
-    "Region", "TextureError", "bars", "levels", "plane_wave", "regions", "rings", "slanted_bars", "walking_bars",
+    "Region", "TextureError", "bars", "levels", "plane_wave", "regions", "rings", "slanted_bars", "unlocked",
+    "walking_bars",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -137,6 +138,23 @@ def walking_bars(
     return _target(grid, PatternKind.BARS, walking=walking)
 
 
+def unlocked(shape: GridShape, *, depth: float, period_s: float) -> TargetPattern:
+    """A motion that never settles: every row beats by itself, as deep and as often as is asked.
+
+    Raises
+    ------
+    TextureError
+        When the depth is not in (0, 1] or the period is not above 0.
+    """
+    if not 0 < depth <= 1:
+        raise TextureError(f"unlocked: expected a depth above 0 and at most 1, got {depth}")
+    if not (math.isfinite(period_s) and period_s > 0):
+        raise TextureError(f"unlocked: expected a period above 0 s, got {period_s}")
+    amplitude: Complexes = np.ones((shape.rows, shape.cols), dtype=np.complex128)
+    amplitude.flags.writeable = False
+    return TargetPattern(amplitude, PatternKind.BARS, unlocked=UnlockedBeats(depth, period_s))
+
+
 def levels(amplitude: ArrayLike) -> TargetPattern:
     """A map of still levels, shape (rows, cols), each 0..1.
 
@@ -185,6 +203,8 @@ def regions(shape: GridShape, parts: Sequence[Region]) -> TargetPattern:
         inside = 0 <= part.top < part.bottom <= shape.rows and 0 <= part.left < part.right <= shape.cols
         if not inside or part.texture.amplitude.shape != amplitude.shape:
             raise TextureError(f"region {number}: does not fit a grid of {shape.rows} x {shape.cols}")
+        if part.texture.unlocked is not None:
+            raise TextureError(f"region {number}: what never settles fills whole rows; show it in a frame of its own")
         if part.texture.walking is not None:
             raise TextureError(f"region {number}: walking bars fill whole rows; show them in a frame of their own")
         window = (slice(part.top, part.bottom), slice(part.left, part.right))

@@ -116,6 +116,10 @@ from .scene_plan import (
 from .travel import (
     quickest_travel as quickest_travel,
 )
+from .waves.beats import (
+    beats_of as beats_of,
+    beats_off as beats_off,
+)
 from .waves.walking import (
     walking_rate_hz as walking_rate_hz,
 )

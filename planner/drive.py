@@ -10,14 +10,14 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Closure, Device
+from chainsim import Chain, Device
 
 from .operating_point import OperatingPoint
 from .plan import Ramp
 
 __all__ = [
-    "DriveTone", "FirstOrderHold", "SmoothStep", "cubic", "cubic_slope", "curve", "felt", "full_motion", "links_at",
-    "play", "samples", "smooth_step", "tones_of",
+    "DriveTone", "FirstOrderHold", "SmoothStep", "closed", "cubic", "cubic_slope", "curve", "felt", "full_motion",
+    "links_at", "play", "samples", "smooth_step", "tones_of",
 ]  # fmt: skip
 
 Floats = NDArray[np.float64]
@@ -241,18 +241,18 @@ def play(
     -------
     Displacements, float64, shape (S, n), dimensionless.
     """
-    ring, force = device.chain.closure is Closure.RING, samples(device, point, ramp, tau, start)[:, None]
+    chain, force = device.chain, samples(device, point, ramp, tau, start)[:, None]
     # Links that stay are given once.
     links = point.lam[None, :] if ramp.lam is None else links_at(point, ramp, tau / device.tau_per_s)
-    lam = _closed(links, ring)[:, None]
-    before = None if ahead is None else (ahead[0][:, None], _closed(ahead[1][None, :], ring)[0])
-    return full_motion(device.chain, float(tau[1] - tau[0]), force, lam, before=before)[:, 0]
+    lam = closed(chain, links)[:, None]
+    before = None if ahead is None else (ahead[0][:, None], closed(chain, ahead[1]))
+    return full_motion(chain, float(tau[1] - tau[0]), force, lam, before=before)[:, 0]
 
 
-def _closed(links: Floats, ring: bool) -> Floats:
-    """With the link into the first actuator: like the next in a ring, none otherwise."""
-    first = links[:, :1] if ring else np.zeros((len(links), 1))
-    return np.concatenate([first, links], axis=1)
+def closed(chain: Chain, links: Floats) -> Floats:
+    """Links of shape (..., n-1) with the one into the first actuator: like the next in a ring, none otherwise."""
+    first = links[..., :1] if chain.law.closed else np.zeros((*links.shape[:-1], 1))
+    return np.concatenate([first, links], axis=-1)
 
 
 def full_motion(
@@ -276,7 +276,7 @@ def full_motion(
     steps, count = force.shape
     grid = GridIntegrator(
         shape=(count, chain.n), chain_length=chain.n, delta=chain.deltas, beta=chain.betas, stiffness=chain.stiffness,
-        ring=chain.closure is Closure.RING, dtau=dtau,
+        ring=chain.law.closed, both_ways=chain.law.both_ways, dtau=dtau,
     )  # fmt: skip
     if before is not None:
         forces, links = before

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from chainsim import Closure, Device
 
 from .family import PatternFamily
-from .targets import AmplitudeTarget, ChainTarget, WalkingTarget, WaveTarget
+from .targets import AmplitudeTarget, ChainTarget, UnlockedTarget, WalkingTarget, WaveTarget
 
 __all__ = ["FAMILIES", "Row", "family_of", "row_of"]
 
@@ -54,6 +54,14 @@ def _linked_corner(device: Device) -> bool:
     return device.grid and device.coupling.scope == "link" and device.coupling.drives == "corner"
 
 
+def _joint(device: Device) -> bool:
+    """Whether links act both ways, or rings have a lam on every link."""
+    coupling = device.coupling
+    return coupling.closure is Closure.BIDIRECTIONAL or (
+        coupling.closure is Closure.RING and coupling.scope == "link" and not _single(device)
+    )
+
+
 def _any(device: Device) -> bool:
     return True
 
@@ -65,8 +73,10 @@ FAMILIES = (
     Row("grid wave", (WaveTarget, AmplitudeTarget, WalkingTarget), _two_ways, ".grids.waves", "GridWaves"),
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
+    Row("joint", (AmplitudeTarget, WaveTarget), _joint, ".waves.joint", "Joint"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),
     Row("walking", (WalkingTarget,), _any, ".waves.walking", "Walks"),
+    Row("unlocked", (UnlockedTarget,), _any, ".waves.unlocked", "Unlocked"),
     Row("wave", (WaveTarget, AmplitudeTarget), _any, ".waves.wave_state", "Waves"),
 )
 

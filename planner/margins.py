@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device, Response
+from chainsim import Chain, Device, Response
 
+from .closed_forms.joint import driven
 from .closed_forms.links import stages
+from .drive import closed
 from .operating_point import Margins, OperatingPoint
 
 __all__ = ["WELL_SHARE", "lacking_of", "noise_error", "slew_of", "well_of"]
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 # Largest share of the hilltop amplitude that is planned for: the escape margin is the rest.
 WELL_SHARE = 0.8
@@ -53,18 +56,22 @@ def noise_error(device: Device, point: OperatingPoint, *, rounding: bool = True)
     added = 0.0 if device.surroundings is None else device.surroundings.amplifier_noise * device.epsilon_max
     if not (step or added):
         return 0.0
-    lam = np.concatenate([[0.0], point.lam])
-    if device.coupling.closure is Closure.RING:
-        lam[0] = lam[1]
-    own = stages(device.chain)
-    stiffness = own.stiffness + lam
-    low, high = (float(np.sqrt(end(stiffness))) for end in (np.min, np.max))
+    chain, lam = device.chain, closed(device.chain, point.lam)
+    own, law = stages(chain), chain.law
+    # Links both ways stiffen an actuator up to twice more, where its neighbours move against it.
+    stiffest = own.stiffness + (4 * lam if law.both_ways else lam)
+    low, high = float(np.sqrt(np.min(own.stiffness if law.both_ways else stiffest))), float(np.sqrt(np.max(stiffest)))
     omega = np.linspace(max(low - WIDTHS * device.delta, 0.05), high + WIDTHS * device.delta, POINTS)
-    stage = stiffness[:, None] - omega**2 + 1j * np.multiply.outer(own.delta, omega)
-    forward = np.concatenate([[1.0], lam[1:]])
-    gain = np.abs(np.cumprod(forward[:, None] / stage, axis=0)) ** 2
-    if device.coupling.closure is Closure.RING:
-        gain = gain / np.abs(1 - np.prod(lam[:, None] / stage, axis=0)) ** 2
+    gain = np.abs(driven(chain, lam, omega).T if law.both_ways else _passed_on(chain, lam, omega)) ** 2
     rate = device.amplifier.rate_hz / device.tau_per_s
     density = (step**2 / 12 * (2 * np.sin(omega / rate / 2)) ** 4 + added**2) / (np.pi * rate)
     return float(np.sqrt(np.trapezoid(density * gain, omega, axis=1).max()))
+
+
+def _passed_on(chain: Chain, lam: Floats, omega: Floats) -> Complexes:
+    """Small motions under a unit force on the first, stage by stage; round a ring over and over. complex128, (n, W)."""
+    own = stages(chain)
+    stage = (own.stiffness + lam)[:, None] - omega**2 + 1j * np.multiply.outer(own.delta, omega)
+    forward = np.concatenate([[1.0], lam[1:]])
+    gain = np.cumprod(forward[:, None] / stage, axis=0)
+    return np.asarray(gain / (1 - np.prod(lam[:, None] / stage, axis=0)) if chain.law.closed else gain)

@@ -87,6 +87,8 @@ class OperatingPoint:
     bias : float64, shape (n,), DC force on each actuator.
     tones : further tones of the drive; `target` is then the largest amplitude that passes by, which the tones
         make in equal parts, side tones apart.
+    beats : depth and period in seconds that are asked of a motion that never settles; `target` and `phasor` are then
+        the loudest that passes by. None where it settles.
     target : float64, shape (n,), the amplitude that is to be felt, in units of full scale (floor included).
     phase : float64, shape (n,), wanted phases in radians, NaN where any will do; None where none matters. Phases
         are those of the motion at omega; one that is common to all chains at that omega makes no difference.
@@ -102,6 +104,7 @@ class OperatingPoint:
     mean: Floats = field(default_factory=_no_numbers)
     bias: Floats = field(default_factory=_no_numbers)
     tones: tuple[PointTone, ...] = ()
+    beats: tuple[float, float] | None = None
     target: Floats = field(default_factory=_no_numbers)
     phase: Floats | None = None
     error: float = 0.0
@@ -115,7 +118,7 @@ class OperatingPoint:
         return bool(self.epsilon) or bool(self.tones)
 
     @property
-    def beats(self) -> bool:
+    def walks(self) -> bool:
         """Whether an actuator is driven at several frequencies."""
         return any(not tone.place for tone in self.tones)
 

@@ -15,7 +15,16 @@ from encoders import TargetPattern, WalkingBars
 
 from .wish import threshold_for
 
-__all__ = ["AS_WISHED", "AmplitudeTarget", "ChainTarget", "DotGoal", "WalkingTarget", "WaveTarget", "targets_of"]
+__all__ = [
+    "AS_WISHED",
+    "AmplitudeTarget",
+    "ChainTarget",
+    "DotGoal",
+    "UnlockedTarget",
+    "WalkingTarget",
+    "WaveTarget",
+    "targets_of",
+]
 
 Floats = NDArray[np.float64]
 
@@ -203,6 +212,22 @@ class WalkingTarget(ChainTarget):
         return replace(self, lam=lam)
 
 
+@dataclass(frozen=True)
+class UnlockedTarget(ChainTarget):
+    """A motion that never settles.
+
+    Attributes
+    ----------
+    depth : of its beats, 0 to 1.
+    period_s : of its beats.
+    """
+
+    depth: float
+    period_s: float
+
+    __hash__ = ChainTarget.__hash__
+
+
 def _array(numbers: tuple[float, ...]) -> Floats:
     array: Floats = np.array(numbers, dtype=np.float64)
     array.flags.writeable = False
@@ -213,6 +238,12 @@ def targets_of(pattern: TargetPattern, device: Device, dots: DotGoal | None = No
     """What a pattern wants of every chain of `device`, row by row; `dots` where its amplitudes are dots."""
     n, size = device.chain_length, np.abs(pattern.amplitude)
     weight = None if pattern.weight is None else np.asarray(pattern.weight, dtype=np.float64)
+    if pattern.unlocked is not None:
+        return [
+            UnlockedTarget(tuple(levels.tolist()), pattern.unlocked.depth, pattern.unlocked.period_s)
+            if np.any(levels) else AmplitudeTarget.of(levels)
+            for levels in size.reshape(-1, n)
+        ]  # fmt: skip
     matters = _phases_that_matter(pattern, size, weight)
     if pattern.walking is None and matters is None:
         return _amplitudes(size if weight is None or np.all(weight > 0) else size * (weight > 0), n, dots)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import ProfileError
 from ..model.device import Device
 from ..model.parts import HigherMode, Surroundings
 from ..threads import in_threads
@@ -42,12 +43,19 @@ class DrawnDevices:
     seed : of the draws and of the noise.
     rate_hz : samples a second.
     frames, weights : how many frames collect what is felt, and how many weights each.
+
+    Raises
+    ------
+    ProfileError
+        When links act both ways.
     """
 
     def __init__(
         self, device: Device, around: Surroundings, *, first: int, count: int, seed: int, rate_hz: float, frames: int,
         weights: int,
     ) -> None:  # fmt: skip
+        if device.chain.law.both_ways:
+            raise ProfileError(f"{device.name}: devices are drawn of chains whose links act one way, not of these")
         self._device, self._around, self._count = device, around, count
         self._chains, self._n = device.chains, device.chain_length
         blocks = -(-count // WIDTH)

@@ -110,6 +110,11 @@ class CouplingLaw:
         return not self.stride and bool(self.back)
 
     @property
+    def both_ways(self) -> bool:
+        """Whether every link also acts on the oscillator before it."""
+        return self.stride > 0
+
+    @property
     def in_line(self) -> bool:
         """Whether each oscillator is fed by the one before it alone, and the first by none."""
         return self.feed_forward and not self.stride

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..equations.coupling import Closure, law_of
+from ..equations.coupling import Closure
 from .calibrated import ActuatorSpread
 
 __all__ = [
@@ -70,8 +70,6 @@ class Coupling(ProfilePart):
 
     @model_validator(mode="after")
     def _consistent(self) -> Coupling:
-        if not law_of(self.closure).plain:
-            raise ValueError("closure: expected open or ring; both ways is for chain files of `dotwave simulate`")
         if self.scope == "none" and self.lam.max > 0:
             raise ValueError("scope none has no lam; remove lam or choose scope chain or link")
         if self.scope == "fixed" and self.lam.min != self.lam.max:

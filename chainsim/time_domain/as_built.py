@@ -57,5 +57,6 @@ class AsBuilt:
             beta=self.beta,
             stiffness=self.stiffness,
             ring=device.chain.law.closed,
+            both_ways=device.chain.law.both_ways,
             dtau=device.tau_per_s / rate_hz,
         )

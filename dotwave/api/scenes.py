@@ -114,15 +114,16 @@ def text(
 def texture(
     kind: Mapping[str, Any] | TargetPattern, device: AnyDevice = USUAL_DEVICE, *, dwell_s: float = 2.0
 ) -> Scene:
-    """A wave, bars at any angle, rings, walking bars, levels, regions of them; text or bars that scroll, a moving dot.
+    """A wave, bars, rings, walking bars, beats, levels, regions of them; text or bars that scroll, a moving dot.
 
     Parameters
     ----------
     kind : mapping or encoders.TargetPattern
         As the key `texture` of a job file: ``{"wave": {"lag_deg": 60}}``, ``{"bars": {"width": 1, "gap": 1}}``,
         ``{"rings": {"row": 2.5, "col": 2.5, "width": 1, "gap": 1}}``, ``{"walking_bars": {"rate_hz": 3}}``,
-        ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by row),
-        ``{"scroll": {"text": "Hello", "columns_per_s": 3}}``, ``{"dot": {"arrow": "right", "actuators_per_s": 3}}``.
+        ``{"unlocked": {"depth": 0.3, "period_s": 1.6}}``, ``{"levels": [[1, 0.5, ...], ...]}`` (of full scale, row by
+        row), ``{"scroll": {"text": "Hello", "columns_per_s": 3}}``,
+        ``{"dot": {"arrow": "right", "actuators_per_s": 3}}``.
     device : Device, name, file or mapping
         Whose grid it covers.
     dwell_s : float

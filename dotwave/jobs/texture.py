@@ -17,6 +17,7 @@ from encoders import (
     regions,
     rings,
     slanted_bars,
+    unlocked,
     walking_bars,
 )
 
@@ -80,6 +81,13 @@ class Walking(Part):
         return self
 
 
+class Unlocked(Part):
+    """A motion that never settles (`encoders.unlocked`)."""
+
+    depth: Annotated[float, Field(gt=0, le=1)]
+    period_s: Positive
+
+
 class RegionPart(Part):
     """A wave or bars on the rows `top` to `bottom` - 1 and the columns `left` to `right` - 1, counted from 0."""
 
@@ -105,6 +113,7 @@ class TexturePart(Part):
     slanted_bars: SlantedBars | None = None
     rings: Rings | None = None
     walking_bars: Walking | None = None
+    unlocked: Unlocked | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
     scroll: ScrollPart | None = None
@@ -143,6 +152,8 @@ class TexturePart(Part):
             return rings(shape, **self.rings.model_dump())
         if self.walking_bars is not None:
             return walking_bars(shape, **self.walking_bars.model_dump())
+        if self.unlocked is not None:
+            return unlocked(shape, **self.unlocked.model_dump())
         if self.levels is not None:
             return levels(self.levels)
         if self.regions is not None:

@@ -88,7 +88,7 @@ class _Passage:
     judge: Judge
     writes: bool
     totals: Totals = field(default_factory=Totals)
-    walks: dict[str, int] = field(default_factory=dict)
+    moves: dict[str, int] = field(default_factory=dict)
     failure: str = ""
     lacking: tuple[str, ...] = ()
 
@@ -97,21 +97,27 @@ class _Passage:
             self.totals.add(frame)
             if frame.outcome is not Outcome.OK:
                 self._failed(number, frame)
-            elif any(state.beats for state in frame.states):
-                self.walks.setdefault(self._pace(frame), number)
+            elif any(state.walks for state in frame.states):
+                self.moves.setdefault(f"{self._pace(frame)} bars a second walk past an actuator", number)
+            else:
+                beats = dict.fromkeys(state.beats for state in frame.states if state.beats is not None)
+                for depth, period_s in beats:
+                    self.moves.setdefault(
+                        f"it never settles, and beats {depth:.2g} deep every {period_s:.3g} s", number
+                    )
             yield frame
 
     def notes(self) -> Iterator[str]:
-        """A line for every pace, with the first frame that has it; then what is lacking for the first that failed."""
-        for pace, number in self.walks.items():
-            yield f"Frame {number}: {pace} bars a second walk past an actuator."
+        """A line for every way to move on, with its first frame; then what is lacking for the first that failed."""
+        for move, number in self.moves.items():
+            yield f"Frame {number}: {move}."
         yield from filter(None, (self.failure, *self.lacking))
 
     def _pace(self, frame: FramePlan) -> str:
         """The slowest and the quickest walk of a frame, bars a second."""
         from planner import walking_rate_hz
 
-        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.beats)
+        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.walks)
         ends = [f"{rates[0]:.3g}", f"{rates[-1]:.3g}"]
         return " to ".join(dict.fromkeys(ends))
 

@@ -13,7 +13,7 @@ from planner import Measured
 
 from ..channels import channels_of
 from .felt import FeltGrid, VoltForces, nominal_per_volt
-from .plant_file import Fingertip, PlantFile
+from .plant_file import Fingertip, PlantError, PlantFile
 from .playout import OutputBlock
 
 __all__ = ["Sensors", "TruePlant", "true_factors"]
@@ -63,6 +63,8 @@ class TruePlant:
     """
 
     def __init__(self, plant: PlantFile, device: Device, rate_hz: float) -> None:
+        if device.chain.law.both_ways:
+            raise PlantError(f"{device.name}: a plant has links that act one way, not such as these; leave --plant out")
         built, factors = AsBuilt(device), true_factors(plant, device)
         shape, drawn = (device.rows, device.cols), factors["force"]
         per_volt = nominal_per_volt(device)

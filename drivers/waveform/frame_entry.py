@@ -49,6 +49,8 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
         mark["smoothness"] = SMOOTHNESS
     if any(state.tones for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
+    if any(state.beats is not None for state in frame.states):
+        mark["beats"] = [next((state.beats for state in row if state.beats is not None), None) for row in rows]
     if any(state.phase is not None for state in frame.states):
         mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]
     if frame.spread is not None:

@@ -59,6 +59,8 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
+    beats : for each row depth and period in seconds of a motion that never settles, None where it does; empty where all
+        rows do. Their targets are the loudest that passes by.
     goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     smoothness : where the pattern travels, order of the smooth step that levels go along over the whole of the frame,
         from those of the frame before to these (`encoders.crossing`); else 0.
@@ -81,6 +83,7 @@ class FrameMark:
     goes_on: tuple[GoesOn, ...] = ()
     number: PageNumber | None = None
     smoothness: int = 0
+    beats: tuple[tuple[float, float] | None, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,7 @@ class _Frame(_Part):
     goes_on: list[_GoesOn] = []
     number: _PageNumber | None = None
     smoothness: Literal[0, 9] = 0
+    beats: list[Annotated[list[Positive], Field(min_length=2, max_length=2)] | None] | None = None
 
 
 class _Heading(_Part):
@@ -219,7 +220,7 @@ class _Check:
             self._refuse(f"{place}.omega", f"expected {rows} numbers, one for each row, got {len(frame.omega)}")
         if len(frame.target) != rows or any(len(row) != cols for row in frame.target):
             self._refuse(f"{place}.target", f"expected {rows} rows of {cols} numbers")
-        for name, value in (("tones", frame.tones), ("moving", frame.moving)):
+        for name, value in (("tones", frame.tones), ("moving", frame.moving), ("beats", frame.beats)):
             if value is not None and len(value) != rows:
                 self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
         for name, grid in (("wish", frame.wish), ("phase", frame.phase)):
@@ -277,6 +278,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
         number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
         smoothness=frame.smoothness,
+        beats=tuple(None if one is None else (one[0], one[1]) for one in frame.beats or ()),
     )
 
 

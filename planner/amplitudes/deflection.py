@@ -42,11 +42,12 @@ class Deflection(AmplitudeFamily):
 
     def _bias(self, z: Floats, force: Floats) -> Floats:
         """Bias that balances deflections z, shape (..., n), plus `force`, what moves them."""
-        before, own = np.roll(z, 1, axis=-1), self._own
-        links = self._links.copy()
-        if self.device.coupling.closure is Closure.OPEN:
+        law, own, links = self.device.chain.law, self._own, self._links.copy()
+        if not law.closed:
             links[0] = 0.0
-        return np.asarray(force + own.stiffness * z + own.beta * z**3 - links * (before - z))
+        pulled = np.zeros_like(z)
+        law.pull(pulled, z, links)
+        return np.asarray(force + own.stiffness * z + own.beta * z**3 - pulled)
 
     @cached_property
     def _own(self) -> Stage:
@@ -74,7 +75,7 @@ class Deflection(AmplitudeFamily):
         ring = device.coupling.closure is Closure.RING
         lam, links = self._links[1:], self._links if ring else self._links[1:]
         setting = Setting.of(device.chain, epsilon=0.0, lam=links if len(links) else 0.0, omega=1.0, bias=biases)
-        rung = "auto" if ring else "static"
+        rung = "static" if device.chain.feed_forward else "auto"
         response = solve(device.chain, setting, tol=TOL, rung=rung, start="rest")
         error = np.abs(response.mean / device.full_scale - targets).max(axis=1)
         return [

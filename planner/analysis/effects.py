@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import ActuatorSpread, Chain, HigherMode, Surroundings
+from chainsim import ActuatorSpread, Chain, HigherMode, Setting, Surroundings
 
 from ..operating_point import OperatingPoint, PointTone, setting_of
 
@@ -43,19 +43,21 @@ class Linearisation:
     @cached_property
     def lam(self) -> Floats:
         """Links, float64, shape (n,); the first closes a ring and is 0 otherwise."""
-        return np.asarray(setting_of(self.chain, [self.point]).lam[0])
+        return np.asarray(self._setting.lam[0])
 
     @cached_property
-    def down(self) -> Floats | None:
-        """Links of a grid from the actuators above, float64, shape (n,); None of a chain."""
-        return None if self.chain.rows == 1 else np.asarray(setting_of(self.chain, [self.point]).lam_y)[0]
+    def _setting(self) -> Setting:
+        return setting_of(self.chain, [self.point])
+
+    @cached_property
+    def _links(self) -> Floats:
+        """What the links add to the matrix of stiffness, float64, shape (n, n)."""
+        down = None if self.chain.rows == 1 else self._setting.lam_y
+        return np.asarray(self.chain.law.matrix(self._setting.lam, down)[0])
 
     def along(self, motion: Complexes) -> Complexes:
         """What the links pull each actuator with under a motion; complex128, shape (n,)."""
-        force = self.lam * (np.roll(motion, 1) - motion)
-        if self.down is not None:
-            force = force + self.down * (np.roll(motion, self.chain.cols) - motion)
-        return np.asarray(force)
+        return np.asarray(-(self._links @ motion))
 
     @cached_property
     def lines(self) -> tuple[PointTone, ...]:
@@ -94,14 +96,9 @@ class Linearisation:
 
     def impedance(self, omega: float, stiffening: Floats | float = 0.0) -> Complexes:
         """Linear equations ``impedance @ A = force`` at a frequency, links in; complex128, shape (n, n)."""
-        chain, each = self.chain, np.arange(self.chain.n)
-        own = chain.stiffness + self.lam + stiffening - omega**2 + 1j * chain.deltas * omega
-        matrix: Complexes = np.diag(np.broadcast_to(own, each.shape).astype(np.complex128))
-        matrix[each, each - 1] -= self.lam
-        if self.down is not None:
-            matrix[each, each] += self.down
-            matrix[each, each - chain.cols] -= self.down
-        return matrix
+        chain = self.chain
+        own = chain.stiffness + stiffening - omega**2 + 1j * chain.deltas * omega
+        return np.asarray(np.diag(np.broadcast_to(own, (chain.n,)).astype(np.complex128)) + self._links)
 
     def moved(self, line: PointTone, force: Complexes) -> Complexes:
         """How a line changes under further forces of shape (n,) or (n, k), to first order; complex128, same shape."""
@@ -190,9 +187,10 @@ class Linearisation:
 
     def without_down(self) -> list[Complexes]:
         """What a grid's links downwards do."""
-        if self.down is None:
+        if self.chain.rows == 1:
             return []
-        pulls = [self.down * (np.roll(line.phasor, self.chain.cols) - line.phasor) for line in self.lines]
+        down = np.asarray(self._setting.lam_y)[0]
+        pulls = [down * (np.roll(line.phasor, self.chain.cols) - line.phasor) for line in self.lines]
         return [self.moved(line, -pull) for line, pull in zip(self.lines, pulls, strict=True)]
 
     def pulled(self, row_lam: float, above: Linearisation) -> list[Complexes]:

@@ -31,6 +31,8 @@ LONGEST, FASTEST = 0.5, 0.01
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-4, 1e-8, 10.0
 # Differences for rings, which have no gradient link by link.
 DIFFERENCE = 1e-6
+# A slope below this part of the largest is none.
+NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -185,20 +187,23 @@ def _jacobian(chain: Chain, wanted: MotionTarget, here: FittedPoint, freedom: Fr
         guess = np.repeat(here.phasor[None, :], count, axis=0)
         answer = balance_near(chain, setting_of(chain, moved), guess, tol=TOL)
         change = (answer.phasor - here.phasor).T / DIFFERENCE
+        change[:, 1] = 1j * here.phasor
     return wanted.slope(here.phasor, change)
 
 
 def _step(jacobian: Floats, residual: Floats, point: OperatingPoint, freedom: Freedom, damping: float) -> Floats:
     """A damped Gauss-Newton step; what stands at the end of its range and is pushed outwards stays there."""
     push = jacobian.T @ residual
-    free = np.ones(jacobian.shape[1], dtype=np.bool_)
+    size = np.linalg.norm(jacobian, axis=0)
+    # Where no phase is wanted turning the drive changes nothing, and its slope is rounding.
+    free = np.asarray(size > NOTHING * size.max(initial=0.0))
     if freedom.lam:
         links, low, high = slice(2, 2 + freedom.lam), freedom.lam_min, freedom.lam_max
         lam = point.lam[: freedom.lam]
-        free[links] = ~(((lam <= low) & (push[links] > 0)) | ((lam >= high) & (push[links] < 0)))
+        free[links] &= ~(((lam <= low) & (push[links] > 0)) | ((lam >= high) & (push[links] < 0)))
     if freedom.omega:
         out = (point.omega <= freedom.omega_min and push[-1] > 0) or (point.omega >= freedom.omega_max and push[-1] < 0)
-        free[-1] = not out
+        free[-1] &= not out
     step = np.zeros(len(free))
     scale = np.maximum(np.linalg.norm(jacobian[:, free], axis=0), 1e-300)
     ridge = damping * np.eye(len(scale))

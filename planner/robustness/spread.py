@@ -103,10 +103,13 @@ class Draws:
         Raises
         ------
         SpreadError
-                For a grid, or links that act both ways: no device profile has them, so no plan needs their spread.
+                For a grid, or links that act both ways: their spread is not judged.
         """
         if chain.closure is Closure.BIDIRECTIONAL or chain.rows > 1:
-            raise SpreadError(f"spread: expected an open chain or a ring, got {chain.closure} with {chain.rows} rows")
+            raise SpreadError(
+                f"spread: expected an open chain or a ring, got {chain.closure} with {chain.rows} rows; "
+                "leave spread out of the device"
+            )
         f0, delta, beta, lam = self.normal
         return BatchParts(
             stiffness=_column(chain.stiffness) * _positive(1 + spread.f0 * f0) ** 2,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from ..drive import FirstOrderHold, cubic, cubic_slope, felt, full_motion, smooth_step
+from ..drive import FirstOrderHold, closed, cubic, cubic_slope, felt, full_motion, smooth_step
 
 __all__ = ["Orbit", "Passage", "Way", "travel"]
 
@@ -113,8 +113,9 @@ class Orbit:
             step[:, None] * a + slope[:, None] * (2 * v + chain.deltas * z) / length + bend[:, None] * z / length**2
             + step[:, None] * chain.deltas * v + chain.stiffness * moved + chain.betas * moved**3
         )  # fmt: skip
-        force[:, 1:] -= self.lam * (moved[:, :-1] - moved[:, 1:])
-        return np.asarray(force)
+        pulled = np.zeros_like(moved)
+        chain.law.pull(pulled, moved, closed(chain, self.lam))
+        return np.asarray(force - pulled)
 
 
 @dataclass(frozen=True)
@@ -143,11 +144,11 @@ def travel(chain: Chain, omega: float, way: Way, start: Orbit | None, periods: i
     tau = dtau * np.arange(steps + periods * SAMPLES_PER_PERIOD, dtype=np.float64)
     carrier = np.exp(1j * np.add.outer(omega * tau, phases))
     envelope = FirstOrderHold.of(omega, dtau).raised(*way.drive(tau))
-    lam = np.pad(way.links(tau), ((0, 0), (1, 0)))[:, None]
+    lam = closed(chain, way.links(tau))[:, None]
     before = None
     if start is not None:
         forces = np.stack([start.prelude(chain, dtau, phase) for phase in phases], axis=1)
-        before = forces / FirstOrderHold.of(start.omega, dtau).passed, np.concatenate([[0.0], start.lam])
+        before = forces / FirstOrderHold.of(start.omega, dtau).passed, closed(chain, start.lam)
     z = full_motion(chain, dtau, (envelope[:, None] * carrier).real, lam, before=before)
     after = felt(z[steps:], carrier[steps:, :, None], SAMPLES_PER_PERIOD)
     return Passage(after.transpose(1, 0, 2), float(np.abs(z).max()))

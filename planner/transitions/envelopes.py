@@ -22,7 +22,7 @@ from .blending import blended
 from .jets import Jet
 from .resample import chebyshev_points, converged, resampled
 
-__all__ = ["ROUGHEST", "SMOOTHEST", "EnvelopeRamp", "change", "fall", "rise"]
+__all__ = ["ROUGHEST", "SMOOTHEST", "EnvelopeRamp", "change", "fall", "force_on", "rise", "timed"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -56,7 +56,7 @@ class EnvelopeRamp:
 
 
 def _blend(duration: float, nodes: int, n: int, order: int) -> Floats:
-    return _timed(jets.smoothstep(order, nodes, 2 * n + 2), duration)
+    return timed(jets.smoothstep(order, nodes, 2 * n + 2), duration)
 
 
 @cache
@@ -65,12 +65,12 @@ def _at_points(n: int) -> Floats:
     return jets.smoothstep_at(ROUGHEST, chebyshev_points(POINTS), 2 * n + 2)
 
 
-def _timed(blend: Floats, duration: float) -> Floats:
+def timed(blend: Floats, duration: float) -> Floats:
     """A jet over [0, 1] as one over `duration` in tau."""
     return np.asarray(blend * (duration ** -np.arange(len(blend), dtype=np.float64))[:, None])
 
 
-def _force(chain: Chain, m: int, omega: float, envelope: Jet, modulus2: Jet) -> Jet:
+def force_on(chain: Chain, m: int, omega: float, envelope: Jet, modulus2: Jet) -> Jet:
     """G_m, two orders shorter than the envelope."""
     own = stages(chain, m)
     first = jets.derivative(envelope)
@@ -114,7 +114,7 @@ def _flat(chain: Chain, amplitude: Floats, omega: float, blend: Floats) -> Envel
     peak = np.empty((count, n))
     for m in range(n - 1, -1, -1):
         peak[:, m] = np.abs(envelope[0]).max(axis=1)
-        force = _force(chain, m, omega, envelope, jets.norm2(envelope))
+        force = force_on(chain, m, omega, envelope, jets.norm2(envelope))
         if m:
             envelope = force / links[:, m - 1, None] + envelope[: len(force)]
     nodes = blend.shape[1]
@@ -148,7 +148,7 @@ def change(chain: Chain, before: Floats, after: Floats, omega: float, duration: 
     drive, lam, slope = np.empty((count, nodes, 4)), np.empty((count, nodes, n - 1)), np.empty((count, nodes, n - 1))
     possible, rest = np.ones(count, dtype=np.bool_), np.arange(count)
     if nodes > POINTS:
-        few = blended(chain, before, after, omega, _timed(_at_points(n), duration))
+        few = blended(chain, before, after, omega, timed(_at_points(n), duration))
         good = few.possible & converged(np.concatenate([few.drive[:, :, :2], few.lam], axis=2))
         # One by one: products this small are done by one core, which others at work do not hold up.
         drive[good], lam[good], slope[good] = (

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from ..drive import smooth_step
+from ..drive import closed, smooth_step
 from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .check import Orbit, Way, travel
@@ -131,7 +131,7 @@ def _left(chain: Chain, held: OperatingPoint, omega: float, way: Way) -> Complex
     steps = math.ceil(duration * max(rate / (2 * omega) / STEP, 4 / (2 * math.pi / omega)))
     tau = np.linspace(0.0, duration, 2 * steps + 1)
     epsilon, epsilon_slope = way.drive(tau)
-    lam = np.pad(way.links(tau), ((0, 0), (1, 0)))
+    lam = closed(chain, way.links(tau))
     slope = np.gradient(lam, tau, axis=0)
     course = DriveCourse(epsilon[:, None], epsilon_slope[:, None], lam, slope, np.zeros_like(lam))
     return np.asarray(follow_course(chain, omega, duration, course, held.phasor, 1.0)[-1, :, 0])

@@ -24,7 +24,7 @@ Complexes = NDArray[np.complex128]
 class WayError(PlanError, ValueError):
     """A way was asked for that makes no sense.
 
-    Examples: a ring; links of another shape than the chain; a phasor that is not finite; a `lam_min` above `lam_max`.
+    Examples: a grid; links of another shape than the chain; a phasor that is not finite; a `lam_min` above `lam_max`.
     """
 
 
@@ -96,8 +96,8 @@ def checked(
         With the argument and its value.
     """
     links, motion = np.asarray(lam, dtype=np.float64), np.asarray(phasor, dtype=np.complex128)
-    if not (chain.plain and chain.feed_forward):
-        raise WayError("chain: expected an open chain of equal actuators over resistors")
+    if chain.rows > 1 or chain.spread is not None or not chain.law.back:
+        raise WayError("chain: expected one chain of equal actuators over resistors")
     if links.shape != (chain.n - 1,) or not np.all(np.isfinite(links) & (links >= 0)):
         raise WayError(f"lam: expected {chain.n - 1} finite numbers >= 0, got {links}")
     if motion.shape != (chain.n,) or not np.isfinite(motion).all() or not motion.any():

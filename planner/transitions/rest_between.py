@@ -35,7 +35,7 @@ def rested(device: Device, before: OperatingPoint, after: OperatingPoint, way: C
 
     Parameters
     ----------
-    before, after : motions of one tone in an open chain.
+    before, after : motions of one tone.
     way : the whole way for a rest of so many seconds.
     """
     tried: list[tuple[float, Ramp]] = []

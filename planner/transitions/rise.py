@@ -13,9 +13,9 @@ from itertools import chain as chain_of
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Chain, Outcome, Setting
+from chainsim import Chain, Outcome
 
-from ..operating_point import OperatingPoint
+from ..operating_point import OperatingPoint, setting_of
 from ..plan import Ramp
 from .check import Orbit, Way
 from .limits import WayLimits, checked
@@ -39,7 +39,7 @@ def find_way(
 
     Parameters
     ----------
-    chain : open, of equal actuators over resistors.
+    chain : one, of equal actuators over resistors.
     epsilon : steady drive phasor.
     lam : float64, shape (n-1,).
     phasor : complex128, shape (n,), the motion they hold.
@@ -79,10 +79,7 @@ def orbit_of(chain: Chain, point: OperatingPoint) -> tuple[Orbit | None, str]:
     """The periodic motion the settings hold near the phasors, and why there is none to go to."""
     from chainsim import balance_near
 
-    setting = Setting.of(
-        chain, epsilon=abs(point.epsilon), phase=float(np.angle(point.epsilon)), lam=point.lam, omega=point.omega
-    )
-    answer = balance_near(chain, setting, point.phasor[None, :], tol=ARRIVES / 100)
+    answer = balance_near(chain, setting_of(chain, [point]), point.phasor[None, :], tol=ARRIVES / 100)
     if answer.outcome[0] not in (Outcome.OK, Outcome.UNSTABLE):
         return None, f"these settings hold no motion near these phasors ({answer.outcome[0]})"
     orbit = Orbit(answer.harmonics[0], point.lam, point.omega)

@@ -18,7 +18,7 @@ from .hermite import broken_line
 from .limits import WayLimits
 from .steering import LinkCourse, Steering
 
-__all__ = ["ARRIVES", "MOST_PERIODS", "STANDS", "RampSearch"]
+__all__ = ["ARRIVES", "MOST_PERIODS", "STANDS", "STRONG", "RampSearch"]
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import Closure, Device
+from chainsim import Device
 
-from ..drive import felt, play, smooth_step
+from ..drive import closed, felt, play, smooth_step
 from ..operating_point import OperatingPoint, PointTone
 from ..plan import Ramp, ToneRamp
 
@@ -146,11 +146,9 @@ def slow_fall(device: Device, point: OperatingPoint, opens: bool) -> Ramp:
 def _dying(device: Device, lam: Floats) -> float:
     """Time in tau after which a chain without drive has lost all but 1/1000, whatever its motion was."""
     n = device.chain_length
-    links = np.concatenate([lam[:1] if device.coupling.closure is Closure.RING else [0.0] * min(n, 1), lam])
-    # Slow flow of small motions: 2 i A' = (lam_m - i delta ...) A_m - lam_m A_{m-1}, in the frame of f0.
-    flow = np.diag(-device.delta / 2 + 0.5j * links).astype(np.complex128)
-    for m in range(n):
-        flow[m, m - 1] -= 0.5j * links[m] if n > 1 else 0.0
+    law = device.chain.law
+    # Slow flow of small motions, in the frame of f0: 2 i A' = -i delta A - (what links add to the stiffness) A.
+    flow = 0.5j * law.matrix(closed(device.chain, lam)[None], None)[0] - device.delta / 2 * np.eye(n)
     step = 0.1 / device.delta
     # Matrix exponential by squaring of a short Taylor step.
     short = flow * (step / 1024)

@@ -1,9 +1,9 @@
-"""The slow flow of an open chain under drive and links that vary, many drives at once.
+"""The slow flow of a chain under drive and links that vary, many drives at once.
 
-With z_m = Re(A_m e^{i omega tau}), one stage obeys ``A'' + D A' + K A = F`` with ``D = 2 i omega + delta``,
-``K = 1 - omega^2 + i delta omega + lam + (3/4) beta |A|^2 + (3/128) beta^2 |A|^4`` (the last term is the third
-harmonic's way back) and ``F = lam A_{m-1}``, or the drive. Second order: A'' is the derivative of the first order,
-``A' = (F - K A) / D``.
+With z_m = Re(A_m e^{i omega tau}), a stage of an open chain obeys ``A'' + D A' + K A = F`` with
+``D = 2 i omega + delta``, ``K = 1 - omega^2 + i delta omega + lam + (3/4) beta |A|^2 + (3/128) beta^2 |A|^4`` (the
+last term is the third harmonic's way back) and ``F = lam A_{m-1}``, or the drive. The chain's law says what else pulls
+at it, in a ring or from behind. Second order: A'' is the derivative of the first order, ``A' = (F - K A) / D``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class DriveCourse:
     Attributes
     ----------
     epsilon, epsilon_slope : complex128, shape (2 N + 1, P), P drive envelopes and their derivatives in tau.
-    lam, lam_slope : float64, shape (2 N + 1, n), the links, the same for all P; ``lam[:, 0]`` is 0.
+    lam, lam_slope : float64, shape (2 N + 1, n), the links, alike for all P; ``lam[:, 0]`` closes a ring or is 0.
     lent : float64, shape (2 N + 1, n), squares of amplitudes whose stiffness is lent where the flow is linear.
     """
 
@@ -37,6 +37,26 @@ class DriveCourse:
     lam: Floats
     lam_slope: Floats
     lent: Floats
+
+
+@dataclass(frozen=True)
+class _Links:
+    """Links at so many instants as their law has them: from the one before, from the one behind, and back; (S, n)."""
+
+    before: Floats
+    behind: Floats | None
+    back: Floats
+
+    @classmethod
+    def of(cls, chain: Chain, lam: Floats) -> _Links:
+        return cls(lam, chain.law.second(lam, None), chain.law.stiffness(np.zeros(1), lam, None))
+
+    def pulled(self, at: int, here: Complexes) -> Complexes:
+        """What they do to actuators at `here`, shape (n, P), without the terms that stiffen them."""
+        force: Complexes = self.before[at, :, None] * np.roll(here, 1, axis=0)
+        if self.behind is not None:
+            force += self.behind[at, :, None] * np.roll(here, -1, axis=0)
+        return force
 
 
 def follow_course(
@@ -59,17 +79,17 @@ def follow_course(
     cubic, quintic = softness * 0.75 * chain.beta, softness * 3 / 128 * chain.beta**2
     lent = (1 - softness) * course.lent * (0.75 * chain.beta + 3 / 128 * chain.beta**2 * course.lent)
     still = 1.0 - omega**2 + 1j * chain.delta * omega + lent
+    links, slopes = _Links.of(chain, course.lam), _Links.of(chain, course.lam_slope)
 
     def slope(at: int, here: Complexes) -> Complexes:
-        lam, lam_slope = course.lam[at, :, None], course.lam_slope[at, :, None]
         square = here.real**2 + here.imag**2
-        stiff = (still[at, :, None] + lam) + square * (cubic + quintic * square)
-        force = np.empty_like(here)
-        force[0], force[1:] = course.epsilon[at], lam[1:] * here[:-1]
+        stiff = (still[at, :, None] + links.back[at, :, None]) + square * (cubic + quintic * square)
+        force = links.pulled(at, here)
+        force[0] += course.epsilon[at]
         first = (force - stiff * here) / damping
-        turning = np.empty_like(here)
-        turning[0], turning[1:] = course.epsilon_slope[at], lam_slope[1:] * here[:-1] + lam[1:] * first[:-1]
-        stiffening = 2 * cubic * (here.real * first.real + here.imag * first.imag) + lam_slope
+        turning = slopes.pulled(at, here) + links.pulled(at, first)
+        turning[0] += course.epsilon_slope[at]
+        stiffening = 2 * cubic * (here.real * first.real + here.imag * first.imag) + slopes.back[at, :, None]
         second = (turning - stiff * first - stiffening * here) / damping
         return np.asarray(first - second / damping)
 

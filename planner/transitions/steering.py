@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chainsim import Chain
 
-from ..drive import smooth_step
+from ..drive import closed, smooth_step
 from ..operating_point import OperatingPoint
 from .slow_flow import DriveCourse, follow_course
 
@@ -141,7 +141,7 @@ class Steering:
         """Amplitudes on the way for unknowns of shape (P, size); complex128, shape (steps + 1, n, P)."""
         x = np.linspace(0.0, 1.0, 2 * self.steps + 1)
         epsilon, epsilon_slope = self.drive(x, unknowns)
-        lam, lam_slope = (np.pad(links, ((0, 0), (1, 0))) for links in self.links.at(x, self.start, self.held))
+        lam, lam_slope = (closed(self.chain, links) for links in self.links.at(x, self.start, self.held))
         course = DriveCourse(epsilon, epsilon_slope / self.duration, lam, lam_slope / self.duration, self._lent(x))
         with np.errstate(all="ignore"):
             return follow_course(self.chain, self.omega, self.duration, course, self.start.phasor, softness)

@@ -10,9 +10,11 @@ from ..margins import WELL_SHARE
 from ..operating_point import OperatingPoint
 from ..plan import Ramp
 from .fall import find_fall
+from .flat_way import flat_fall, flat_rise
 from .joining import as_tone
 from .limits import WayLimits
 from .rise import find_way
+from .search import STRONG
 from .slow import slow_fall, slow_rise
 from .tones import quick_rise
 
@@ -30,28 +32,40 @@ def enter_wave(device: Device, point: OperatingPoint, moves: bool, tolerance: fl
     moves : where lam may differ on the way from what it is in the end.
     tolerance : of what is waited for where no quick way is found, relative to the largest amplitude.
     """
-    lacking = ""
-    if device.coupling.closure is Closure.OPEN:
-        ramp = find_way(
-            device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
-            limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
-        )  # fmt: skip
-        if not ramp.lacking:
-            return ramp
-        lacking = ramp.lacking
+    if device.chain.spread is not None:
+        return slow_rise(device, point, tolerance)
+    if _flat(device):
+        flat = flat_rise(device, point, limits_of(device, moves))
+        if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
+            return slow_rise(device, point, tolerance) if flat is None else flat
+    quick = find_way(
+        device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
+        limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
+    )  # fmt: skip
+    if not quick.lacking:
+        return quick
     ramp = slow_rise(device, point, tolerance)
-    return ramp if not (ramp.lacking and lacking) else _lacking(ramp, lacking)
+    return _lacking(ramp, quick.lacking) if ramp.lacking else ramp
 
 
 def leave_wave(device: Device, point: OperatingPoint, moves: bool) -> Ramp:
     """From a wave of one tone to rest, the drive among the ramp's tones."""
-    if device.coupling.closure is not Closure.OPEN:
+    if device.chain.spread is not None:
         return slow_fall(device, point, moves)
+    if _flat(device):
+        flat = flat_fall(device, point, limits_of(device, moves))
+        if flat is not None or float(point.lam.max(initial=0.0)) > STRONG:
+            return slow_fall(device, point, moves) if flat is None else as_tone(flat, point.omega)
     ramp = find_fall(
         device.chain, epsilon=point.epsilon, lam=point.lam, omega=point.omega, phasor=point.phasor,
         limits=limits_of(device, moves), tau_per_s=device.tau_per_s, budget=BUDGET,
     )  # fmt: skip
     return as_tone(ramp, point.omega)
+
+
+def _flat(device: Device) -> bool:
+    """Whether links may be strong in a chain whose actuators act on each other."""
+    return device.chain.law.both_ways or (device.chain.law.closed and device.coupling.scope == "link")
 
 
 def enter_tones(device: Device, point: OperatingPoint, moves: bool, tolerance: float) -> Ramp:

@@ -26,11 +26,12 @@ def walking_speeds(device: Device) -> WalkingSpeeds | None:
     """How fast bars of full scale can walk under one lam; None where none can.
 
     Bars of a width w come 2 w actuators apart, ``f0 delta tan(pi / 2 w)`` times a second where beta is small
-    (theory.md section 2.5); each width is tried as it is planned.
+    (theory.md section 2.5); each width is tried as it is planned. Where waves do not run one way along a
+    chain that ends (rings, links both ways, grids) none come to stand.
     """
     n = device.chain_length
     speeds = []
-    for width in WIDTHS if n > 1 else ():
+    for width in WIDTHS if n > 1 and device.chain.law.in_line else ():
         state = walking_state(device, WalkingTarget((1.0,) * n, (1.0,) * n, width))
         if state.outcome is Outcome.OK:
             speeds.append(2 * width * walking_rate_hz(device, state))
@@ -39,7 +40,10 @@ def walking_speeds(device: Device) -> WalkingSpeeds | None:
 
 def cannot_travel(device: Device) -> str:
     """Why dots do not travel on a device, what is nearest, and how fast that is."""
-    why = f"{device.name} cannot let dots travel: it has no bias on every actuator and no lam on every link"
+    lacks = "no bias on every actuator and no lam on every link"
+    if device.coupling.scope == "link":
+        lacks = "to rest between two patterns of dots"
+    why = f"{device.name} cannot let dots travel: it has {lacks}"
     speeds = walking_speeds(device)
     if speeds is None:
         return f"{why}."

@@ -56,6 +56,9 @@ class Walks(RisingFamily):
 def walking_state(device: Device, target: WalkingTarget) -> OperatingPoint:
     """The settings for a wave of two tones of half the wanted amplitude; the nearest where they cannot be made."""
     level = float(target.levels.max())
+    if device.chain.law.both_ways and device.chain_length > 1:
+        lacking = "bars walk where waves run one way; it lacks links that act one way"
+        return _nothing(device, target, lacking)
     if np.ptp(target.levels[target.weights > 0]) > 0:
         return _nothing(
             device, target, "bars walk with one amplitude along a chain; it lacks a drive for every actuator"

@@ -19,6 +19,7 @@ from ..operating_point import Margins, OperatingPoint
 from ..plan import Ramp
 from ..targets import AmplitudeTarget, ChainTarget, WaveTarget
 from ..transitions.waves import enter_wave, leave_wave
+from .joint_fit import JointFit
 from .wave_fit import GOOD, WaveFit
 
 __all__ = ["Waves", "wave_state"]
@@ -72,13 +73,19 @@ def wave_state(device: Device, target: WaveTarget) -> OperatingPoint:
     Where the target cannot be made the nearest is given: the same wave with as much amplitude as stands, or the
     nearest motion of all.
     """
-    task = WaveFit(device, target)
+    task = (JointFit if _joint(device, target) else WaveFit)(device, target)
     found, share = task.best(1.0), 1.0
     near = np.isfinite(found.error) and found.error > GOOD * task.scale and found.outcome is Outcome.OK
     if not task.stands(found) and not near and not task.jagged:
         lower = task.lower()
         share, found = (1.0, found) if lower is None else lower
     return _Told(task, found, share).state()
+
+
+def _joint(device: Device, target: WaveTarget) -> bool:
+    """Whether closed forms of waves do not say it: links act both ways, or each of a ring is for amplitudes alone."""
+    linked = device.chain.law.closed and device.coupling.scope == "link"
+    return device.chain.law.both_ways or (linked and int(np.count_nonzero(~np.isnan(target.phases))) <= 1)
 
 
 @dataclass(frozen=True)
@@ -143,7 +150,8 @@ class _Told:
             return "waves travel away from a drive, lagging by 0 to 180 degrees; it lacks a drive for every actuator"
         if found.outcome is not Outcome.OK:
             return "nothing near it is stable; it lacks damping, or linearity (a smaller beta)"
-        return self._out_of_range() or self._no_freedom()
+        # Where actuators act on each other the nearest may lie anywhere, and more range would bring it no nearer.
+        return ("" if isinstance(task, JointFit) else self._out_of_range()) or self._no_freedom()
 
     def _uneven(self) -> bool:
         """Whether neighbours are to differ as one lam and one drive never let them."""

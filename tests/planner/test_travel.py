@@ -92,7 +92,7 @@ def test_too_quick_is_refused_with_the_quickest(device: object, most: float) -> 
     assert planned(dot(most, 1 / most), name)[1].outcome is Outcome.OK
 
 
-@pytest.mark.parametrize("name", ["paper-6x6-ring", "ultrasonic-6x6"])
+@pytest.mark.parametrize("name", ["ultrasonic-6x6"])
 def test_devices_that_cannot_say_what_is_nearest_and_how_fast(name: str) -> None:
     speeds = known(walking_speeds(load_device(name)))
     assert speeds.slowest < speeds.quickest
@@ -147,3 +147,19 @@ def test_a_frame_that_travels_needs_no_lead() -> None:
     pattern = next(iter(dot(1.0))).pattern
     plans = list(plan_scene(Scene(GRID, (Frame(pattern, 0.5, travels=True),)), LINKED).frames)
     assert plans[0].outcome is Outcome.OK
+
+
+@pytest.mark.parametrize(
+    ("name", "lacks"),
+    [
+        ("grid-6x6", "no bias on every actuator and no lam on every link"),
+        ("paper-6x6-ring", "no bias on every actuator and no lam on every link"),
+        ("linked-ring-6x6", "to rest between two patterns of dots"),
+        ("linked-both-ways-6x6", "to rest between two patterns of dots"),
+    ],
+)
+def test_nothing_is_called_near_that_cannot_be_made(name: str, lacks: str) -> None:
+    """Bars that walk do not come to stand on any of these either."""
+    assert walking_speeds(load_device(name)) is None
+    with pytest.raises(CannotTravel, match=rf"it has {lacks}\.$"):
+        planned(dot(1.0), name)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
-from chainsim import Chain, Closure, GridIntegrator, Outcome, Setting, balance_near, load_device
+from chainsim import Chain, GridIntegrator, Outcome, Setting, balance_near, load_device
 from planner.amplitudes.refine import refine
 from planner.operating_point import OperatingPoint
 from planner.plan import Ramp
@@ -283,9 +283,9 @@ def test_a_fall_leaves_a_thousandth(lag: float, scope: Literal["chain", "fixed"]
 
 def test_what_makes_no_sense_is_refused() -> None:
     omega, held = wave(120, 0.07)
-    ring = Chain(n=6, delta=PAPER.delta, beta=-1.0, closure=Closure.RING)
+    grid = Chain(n=6, delta=PAPER.delta, beta=-1.0, rows=2)
     for chain, other in [
-        (ring, held),
+        (grid, held),
         (PAPER.chain, replace(held, lam=held.lam[:3])),
         (PAPER.chain, replace(held, lam=np.linspace(1, 2, 5) * 1e-3)),
         (PAPER.chain, replace(held, phasor=np.zeros(6, complex))),
