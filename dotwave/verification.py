@@ -18,6 +18,7 @@ from encoders import FeltPage, back_check, covered_emphases, covered_text, empha
 
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
+from .swelling import Swelling
 
 __all__ = ["forces_under", "frequencies", "verify"]
 
@@ -32,8 +33,8 @@ class _Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
     `level` is what is compared with wish and target: the mean of a bias pattern, else the amplitude at the drive's
-    frequency, or the sum of those at all its tones; where nothing is to move without a bias, the amplitude of all that
-    does.
+    frequency, or the sum of those at all its tones; of a modulated carrier what is felt of how it swells; where nothing
+    is to move without a bias, the amplitude of all that does.
     `still` and `moving` are both of them. `error` is the deviation from the target: of the complex amplitude where
     phases are wanted, of the worst tone where there are several.
     """
@@ -153,11 +154,15 @@ class _Fit:
         self._gram = [np.zeros((size, size)) for size in sizes]
         self._load = [np.zeros((size, device.cols)) for size in sizes]
         self._squares = np.zeros((device.rows, device.cols))
+        self._modulated = np.array(mark.modulated)
+        self._swelling = Swelling(device, rate_hz) if any(mark.modulated) else None
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
         inside = slice(*np.searchsorted(index, [self.first, self.stop]))
         tau = index[inside] / self._rate_hz * self._device.tau_per_s
+        if self._swelling is not None:
+            self._swelling.take(index[inside], z[inside])
         for row, rates in enumerate(self._rates):
             if row == 0 or rates != self._rates[row - 1]:
                 waves = (wave(rate * tau) for rate in rates for wave in (np.cos, np.sin))
@@ -190,7 +195,16 @@ class _Fit:
         # Without a bias nothing but a motion can be felt of a row that is to stand still.
         level = np.where((standing & (self._device.bias == "actuator"))[:, np.newaxis], still, moving)
         worst[standing] = np.abs(level - mark.target)[standing]
+        if self._swelling is not None:
+            self._swelled(level, worst, moving)
         return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)))
+
+    def _swelled(self, level: Floats, worst: Floats, moving: Floats) -> None:
+        """Of rows whose carriers are not felt, put in what is."""
+        assert self._swelling is not None
+        rows, felt = self._modulated, self._swelling.felt()
+        level[rows] = moving[rows] = felt[rows]
+        worst[rows] = np.abs(felt - self._mark.target)[rows]
 
     def _out_of_phase(self, phasor: Complexes) -> Floats:
         """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""

@@ -34,6 +34,11 @@ def _single(device: Device) -> bool:
     return device.chain_length == 1
 
 
+def _modulated(device: Device) -> bool:
+    """Whether a carrier is felt in how it swells only."""
+    return device.modulation is not None
+
+
 def _linked(device: Device) -> bool:
     """Whether any pattern can be made by vibration: with a lam per link, or without coupling."""
     return _single(device) or (device.coupling.scope == "link" and device.coupling.closure is Closure.OPEN)
@@ -45,6 +50,7 @@ def _any(device: Device) -> bool:
 
 # Of those that make a target the first.
 FAMILIES = (
+    Row("modulated", (AmplitudeTarget,), _modulated, ".modulation.modulated", "Modulated"),
     Row("deflection", (AmplitudeTarget,), _biased, ".amplitudes.deflection", "Deflection"),
     Row("amplitude", (AmplitudeTarget,), _linked, ".amplitudes.vibration", "Vibration"),
     Row("single", (WalkingTarget,), _single, ".waves.single", "SingleWalk"),

@@ -90,6 +90,7 @@ class OperatingPoint:
         are those of the motion at omega; one that is common to all chains at that omega makes no difference.
     error : predicted worst deviation from `target`, in units of full scale.
     lacking : one clause on what the device lacks for the target, empty when it can make it or the family says it.
+    modulated : `target` is felt in how the motion swells (`chainsim.felt_modulation`); all tones are side tones.
     """
 
     epsilon: complex
@@ -106,11 +107,17 @@ class OperatingPoint:
     margins: Margins = Margins(0.0, 0.0)
     outcome: Outcome = Outcome.OK
     lacking: str = ""
+    modulated: bool = False
 
     @property
     def moving(self) -> bool:
         """Whether the target is an amplitude of vibration, not a deflection."""
         return bool(self.epsilon) or bool(self.tones)
+
+    @property
+    def walks(self) -> bool:
+        """Whether several of its tones are wanted, which beat as bars that walk."""
+        return any(not tone.side for tone in self.tones)
 
     @property
     def resting(self) -> bool:

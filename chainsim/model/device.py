@@ -19,7 +19,7 @@ from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
 from .surroundings import Surroundings
 
-__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+__all__ = ["Amplifier", "Coupling", "Device", "Modulation", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
@@ -93,6 +93,13 @@ class Amplifier(_Part):
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
+class Modulation(_Part):
+    """The beat of a carrier that is too fast to be felt: its envelope goes as ``(1 + depth cos(2 pi hz t))``."""
+
+    hz: Annotated[float, Field(ge=10, le=1000)]
+    depth: Annotated[float, Field(gt=0, le=1)] = 1.0
+
+
 class Note(_Part):
     """Where a value of the profile comes from."""
 
@@ -130,6 +137,8 @@ class Device(_Part):
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
         lam: 0.0}`` (relative standard deviations); plans are then made for many such devices. None: none is known.
+    modulation : how the envelope of a carrier goes that is not felt itself; levels are then those of the modulation.
+        None: what vibrates is felt.
     surroundings : what acts on the device beside all that; plans count its `amplifier_noise` as error, `explain` and
         as-built studies all of it.
     notes : field name, or ``surroundings.`` and a name in there -> where the value comes from.
@@ -165,6 +174,7 @@ class Device(_Part):
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
+    modulation: Modulation | None = None
     surroundings: Surroundings | None = None
     notes: dict[str, Note] = {}
 
@@ -178,6 +188,8 @@ class Device(_Part):
             raise ValueError("coupling.scope none needs chain_length 1")
         wrong = misplaced(self.actuators, self.rows, self.cols, self.chain_length)
         wrong = wrong or far_off(self.actuators, self.f0_hz)
+        if self.modulation is not None and self.modulation.hz > self.f0_hz / 20:
+            wrong = wrong or f"modulation.hz {self.modulation.hz:g} is too fast for a carrier of {self.f0_hz:g} Hz"
         if wrong:
             raise ValueError(wrong)
         known = {*type(self).model_fields, *(f"surroundings.{name}" for name in Surroundings.model_fields)}
@@ -296,7 +308,7 @@ class Device(_Part):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        left_out = {name for name in ("spread", "surroundings") if getattr(self, name) is None}
+        left_out = {name for name in ("modulation", "spread", "surroundings") if getattr(self, name) is None}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)
 
 

@@ -32,6 +32,7 @@ from .command import (
     Explain,
     Json,
     Language,
+    Modulated,
     Output,
     Pareto,
     Scheduler,
@@ -103,6 +104,7 @@ def text(
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
     share: Yield = None,
+    modulation: Modulated = None,
     encoding: Annotated[str | None, typer.Option(help="Of the file's characters, such as cp1252.")] = None,
     emphasis: Annotated[EmphasisChoice | None, typer.Option(help="Of documents, written or not.")] = None,
     images: Annotated[ImageChoice | None, typer.Option(help="Of documents, as the words they bring or felt.")] = None,
@@ -136,11 +138,11 @@ def text(
     Example:
       dotwave text "Hello world" --device linked-6x6 -o hello.wav
     """
-    from ..api.scenes import device as device_of, text as text_scene
+    from ..api.scenes import text as text_scene
     from ..rendering.render import render
     from ..request import request_of
     from ..source import text_source
-    from .options import place_of, refuse, text_options
+    from .options import place_of, profile_of, refuse, text_options
 
     request = request_of(
         tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
@@ -152,7 +154,7 @@ def text(
         encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
         page_numbers=page_numbers,
     )  # fmt: skip
-    profile = device_of(device)
+    profile = profile_of(device, modulation)
     if os.path.isdir(source):
         given = Path(source), output, profile, options, request
         finish_folder(*given, as_json, waveforms=waveforms, workers=workers, scheduler=scheduler)

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from ..request import Request
 
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Output", "Pareto", "Scheduler", "Tol",
-    "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder", "printable", "say",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Modulated", "Output", "Pareto",
+    "Scheduler", "Tol", "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder",
+    "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -62,6 +63,9 @@ Yield = Annotated[
     typer.Option(
         "--yield", min=0.0, max=1.0, help="Share of devices, drawn with the device's spread, that are to keep it."
     ),
+]
+Modulated = Annotated[
+    str | None, typer.Option("--modulation", metavar="HZ[,DEPTH]", help="Of a carrier; none: as the device has it.")
 ]
 Actuator = Annotated[
     str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")

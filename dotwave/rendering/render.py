@@ -89,6 +89,7 @@ class _Passage:
     writes: bool
     totals: Totals = field(default_factory=Totals)
     walks: dict[str, int] = field(default_factory=dict)
+    modulated: bool = False
     failure: str = ""
     lacking: tuple[str, ...] = ()
 
@@ -97,21 +98,26 @@ class _Passage:
             self.totals.add(frame)
             if frame.outcome is not Outcome.OK:
                 self._failed(number, frame)
-            elif any(state.tones for state in frame.states):
+            elif any(state.walks for state in frame.states):
                 self.walks.setdefault(self._pace(frame), number)
+            self.modulated |= any(state.modulated for state in frame.states)
             yield frame
 
     def notes(self) -> Iterator[str]:
         """A line for every pace, with the first frame that has it; then what is lacking for the first that failed."""
         for pace, number in self.walks.items():
             yield f"Frame {number}: {pace} bars a second walk past an actuator."
+        if self.modulated:
+            from ..reports.modulated import modulation_words
+
+            yield f"Felt as carriers swell: {modulation_words(self.plan.device)}."
         yield from filter(None, (self.failure, *self.lacking))
 
     def _pace(self, frame: FramePlan) -> str:
         """The slowest and the quickest walk of a frame, bars a second."""
         from planner import walking_rate_hz
 
-        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.tones)
+        rates = sorted(walking_rate_hz(self.plan.device, state) for state in frame.states if state.walks)
         ends = [f"{rates[0]:.3g}", f"{rates[-1]:.3g}"]
         return " to ".join(dict.fromkeys(ends))
 

@@ -44,7 +44,9 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
     goes_on, page_number = [asdict(one) for one in frame.frame.goes_on], frame.frame.number
     rare = {"contrast_db": frame.wish.contrast_db, "goes_on": goes_on, "number": page_number and asdict(page_number)}
     mark |= {key: value for key, value in rare.items() if value}
-    if any(state.tones for state in frame.states):
+    if any(state.modulated for state in frame.states):
+        mark["modulated"] = [any(state.modulated for state in row) for row in rows]
+    if any(state.walks for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.phase is not None for state in frame.states):
         mark["phase"] = [[phase for state in row for phase in _phases(state)] for row in rows]

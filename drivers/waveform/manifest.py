@@ -59,6 +59,7 @@ class FrameMark:
     outcome : how planning it went.
     page : frames of one page are superposed by the reader.
     span : (start, end) of `text` in the source.
+    modulated : for each row whether its target is felt in how a carrier swells, as the device's `modulation` says.
     goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     """
 
@@ -78,6 +79,7 @@ class FrameMark:
     wish: FrameWish
     goes_on: tuple[GoesOn, ...] = ()
     number: PageNumber | None = None
+    modulated: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True)
