@@ -45,6 +45,7 @@ from .command import (
     Yield,
     finish as _finish,
     finish_folder,
+    finish_run,
 )
 from .completion import completed_devices, completed_texts
 from .ending import ended
@@ -159,8 +160,7 @@ def text(
         given = Path(source), output, profile, options, request
         finish_folder(*given, as_json, waveforms=waveforms, workers=workers, scheduler=scheduler)
     refuse("a folder of texts", waveforms=waveforms or None, workers=workers, scheduler=scheduler)
-    report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
-    _finish(report, as_json, ok=report.ok)
+    finish_run(render(text_scene(text_source(source, options), profile, options), profile, output, request), as_json)
 
 
 @app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)

@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from chainsim import Device as Profile
     from encoders import TextOptions
 
+    from ..reports.report import Report
     from ..request import Request
 
 __all__ = [
     "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Modulated", "Output", "Pareto",
     "Scheduler", "Tol", "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder",
-    "printable", "say",
+    "finish_run", "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -96,6 +97,11 @@ def finish(report: Printable, as_json: bool, *, ok: bool) -> NoReturn:
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
     say(shown)
     raise typer.Exit(0 if ok else 1)
+
+
+def finish_run(report: Report, as_json: bool) -> NoReturn:
+    """As `finish`, with the exit code that the report's outcome has."""
+    finish(report, as_json, ok=report.ok)
 
 
 def finish_folder(

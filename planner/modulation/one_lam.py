@@ -1,4 +1,4 @@
-"""Tones that beat at some actuators of a chain and pass others evenly, though one lam holds all of its links.
+"""BeatingTones that beat at some actuators of a chain and pass others evenly, though one lam holds all of its links.
 
 A stage turns and magnifies each tone of a drive in its own way. So the envelope of several tones swells at one actuator
 and stands at the next, as their phases fall. Small motions are searched from many starts, in closed form with exact
@@ -18,17 +18,19 @@ from chainsim import Device, Modulation, beats_of, felt_modulation, skin_gain
 from ..wish import CONTRAST_LIMIT_DB, DOT_THRESHOLD
 from .beating import beats_in, driven
 
-__all__ = ["Tones", "beating_over"]
+__all__ = ["BeatingTones", "beating_over"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-# Tones to each side of the middle one; instants of a beat; starts that are tried.
+# BeatingTones to each side of the middle one; instants of a beat; starts that are tried.
 SIDES, INSTANTS, STARTS = 3, 32, 400
 # Steps of one search, and of following to full scale.
 STEPS, FOLLOWED = 80, 40
-# Parts of full scale on the way there.
-SCALES = (0.1, 0.3, 0.6, 1.0)
+# Parts of full scale on the way there, and how many small motions are followed.
+SCALES, FOLLOWS = (0.1, 0.3, 0.6, 1.0), 4
+# Levels beyond this are all alike to a search; one that is farther off than this on its way is lost.
+MOST_LEVEL, LOST = 10.0, 0.1
 # Weights of what is not to be felt, of what is, and of large tones; the largest envelope that is taken, of full scale.
 SILENT, RAISED, LARGE, HIGHEST = 2.0, 4.0, 0.003, 4.0
 # Decibels kept beyond those that are needed, and how near a raised level must come.
@@ -36,7 +38,7 @@ SPARE_DB, NEAR = 0.5, 0.015
 SEED = 20
 
 
-class Tones(NamedTuple):
+class BeatingTones(NamedTuple):
     """What one chain is to do: links, middle tone over f0, tones of its last actuator, and the levels then felt."""
 
     lam: Floats
@@ -45,8 +47,8 @@ class Tones(NamedTuple):
     levels: Floats
 
 
-def beating_over(device: Device, beat: Modulation, levels: Floats, contrast_db: float) -> Tones | None:
-    """Tones that make levels felt; None where none were found.
+def beating_over(device: Device, beat: Modulation, levels: Floats, contrast_db: float) -> BeatingTones | None:
+    """BeatingTones that make levels felt; None where none were found.
 
     Parameters
     ----------
@@ -54,7 +56,7 @@ def beating_over(device: Device, beat: Modulation, levels: Floats, contrast_db: 
     contrast_db : wished between raised and flat; the usual least of 12 dB is taken, too.
     """
     rng = np.random.default_rng(SEED)
-    wanted = min(contrast_db, CONTRAST_LIMIT_DB) + SPARE_DB
+    wanted, follows = min(contrast_db, CONTRAST_LIMIT_DB) + SPARE_DB, FOLLOWS
     for lam, omega in _places(device, beat, rng):
         small = _Small(device, beat, levels, lam, omega)
         last = small.found(rng)
@@ -63,6 +65,9 @@ def beating_over(device: Device, beat: Modulation, levels: Floats, contrast_db: 
         found = _followed(device, beat, levels, lam, omega, last)
         if found is not None and _contrast_db(levels, found.levels) >= wanted:
             return found
+        follows -= 1
+        if not follows:
+            break
     return None
 
 
@@ -103,7 +108,7 @@ class _Small:
         self._hear = hear * (gain / plain)[:, None]
 
     def found(self, rng: np.random.Generator) -> Complexes | None:
-        """Tones of the last actuator for levels, from one start; None where they would have to be too large."""
+        """BeatingTones of the last actuator for levels, from one start; None where they would have to be too large."""
         from scipy.optimize import least_squares
 
         tones = 2 * len(self._size)
@@ -146,7 +151,7 @@ class _Small:
 
 def _followed(
     device: Device, beat: Modulation, levels: Floats, lam: float, omega: float, small: Complexes
-) -> Tones | None:
+) -> BeatingTones | None:
     """The tones at full scale, where the cubic term counts; None where they are lost on the way."""
     from scipy.optimize import least_squares
 
@@ -158,8 +163,8 @@ def _followed(
         last = scale * device.full_scale * (x[:half] + 1j * x[half:])
         with np.errstate(over="ignore", invalid="ignore"):
             motion = driven(device.chain, links, omega, step, last, one).motion[:, :, 0]
-            square = beats_in(motion, beats)
-        return np.nan_to_num(felt_modulation(square, beat, scale * device.full_scale), nan=1e3, posinf=1e3)
+            found = felt_modulation(beats_in(motion, beats), beat, scale * device.full_scale)
+        return np.minimum(np.nan_to_num(found, nan=MOST_LEVEL), MOST_LEVEL)
 
     def away(y: Floats, scale: float) -> Floats:
         now = felt(y * sizes, scale)
@@ -168,8 +173,10 @@ def _followed(
     x = np.concatenate([small.real, small.imag]) / sizes
     for scale in SCALES:
         x = least_squares(away, x, args=(scale,), max_nfev=FOLLOWED).x
+        if np.abs(felt(x * sizes, scale) - levels)[raised].max() > LOST:
+            return None
     now = felt(x * sizes, 1.0)
     if np.abs(now - levels)[raised].max() > NEAR:
         return None
     last = device.full_scale * (x * sizes)[:half] + 1j * device.full_scale * (x * sizes)[half:]
-    return Tones(links, omega, last, np.where(raised, levels, now))
+    return BeatingTones(links, omega, last, np.where(raised, levels, now))
