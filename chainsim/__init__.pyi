@@ -110,6 +110,7 @@ from .model.device import (
     Amplifier as Amplifier,
     Coupling as Coupling,
     Device as Device,
+    Modulation as Modulation,
     Note as Note,
     Span as Span,
     device_names as device_names,
@@ -124,6 +125,12 @@ from .model.response import (
     Outcome as Outcome,
     Response as Response,
     Stats as Stats,
+)
+from .model.skin import (
+    beats_of as beats_of,
+    felt_modulation as felt_modulation,
+    sideband_gain as sideband_gain,
+    skin_gain as skin_gain,
 )
 from .npy_header import (
     NpyHeader as NpyHeader,

@@ -15,6 +15,9 @@ from .api.plans import (
     ScenePlan as ScenePlan,
     plan as plan,
 )
+from .api.reach import (
+    reach as reach,
+)
 from .api.scenes import (
     device as device,
     job as job,

@@ -28,6 +28,7 @@ from encoders import (
 from .beating import Envelope
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
+from .swelling import Swelling
 
 if TYPE_CHECKING:
     from .passing import PassingFit
@@ -45,8 +46,8 @@ class _Felt(NamedTuple):
     """What one frame makes felt, in units of full scale: float64, shape (rows, cols) each.
 
     `level` is what is compared with wish and target: the mean of a bias pattern, else the amplitude at the drive's
-    frequency, or the sum of those at all its tones; where nothing is to move without a bias, the amplitude of all that
-    does.
+    frequency, or the sum of those at all its tones; of a modulated carrier what is felt of how it swells; where nothing
+    is to move without a bias, the amplitude of all that does.
     `still` and `moving` are both of them. `error` is the deviation from the target: of the complex amplitude where
     phases are wanted, of the worst tone where there are several. `way` is the largest deviation from the way of what
     travels, else None.
@@ -188,6 +189,8 @@ class _Fit:
             row: Envelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
             for row, beats in enumerate(mark.beats) if beats is not None
         }  # fmt: skip
+        self._modulated = np.array(mark.modulated)
+        self._swelling = Swelling(device, rate_hz) if any(mark.modulated) else None
 
     def take(self, index: NDArray[np.intp], z: Floats) -> None:
         """Collect the samples of a block that belong to the frame."""
@@ -197,6 +200,8 @@ class _Fit:
         tau = index[inside] / self._rate_hz * self._device.tau_per_s
         for row, envelope in self._envelopes.items():
             envelope.take(index[inside] / self._rate_hz - self.first / self._rate_hz, z[inside, row])
+        if self._swelling is not None:
+            self._swelling.take(index[inside], z[inside])
         for row, rates in enumerate(self._rates):
             if row == 0 or rates != self._rates[row - 1]:
                 waves = (wave(rate * tau) for rate in rates for wave in (np.cos, np.sin))
@@ -231,8 +236,17 @@ class _Fit:
         worst[standing] = np.abs(level - mark.target)[standing]
         for row, envelope in self._envelopes.items():
             level[row], worst[row] = envelope.judged(mark.target[row] * full, mark.beats[row] or (0.0, 1.0), full)
+        if self._swelling is not None:
+            self._swelled(level, worst, moving)
         way = None if self._passing is None else self._passing.error()
         return _Felt(level, still, moving, np.maximum(worst, self._out_of_phase(phasor)), way)
+
+    def _swelled(self, level: Floats, worst: Floats, moving: Floats) -> None:
+        """Of rows whose carriers are not felt, put in what is."""
+        assert self._swelling is not None
+        rows, felt = self._modulated, self._swelling.felt()
+        level[rows] = moving[rows] = felt[rows]
+        worst[rows] = np.abs(felt - self._mark.target)[rows]
 
     def _out_of_phase(self, phasor: Complexes) -> Floats:
         """Deviation from the wanted phasors, 0 where any phase will do; rows of one omega are turned alike."""

@@ -14,6 +14,14 @@ from .analysis.questions import (
     questions_of as questions_of,
     seconds_words as seconds_words,
 )
+from .analysis.reach import (
+    KINDS as KINDS,
+    ReachKind as ReachKind,
+    ReachRow as ReachRow,
+    WaveMap as WaveMap,
+    reach_row as reach_row,
+    wave_map as wave_map,
+)
 from .analysis.requirement import (
     Requirement as Requirement,
     RequirementError as RequirementError,
@@ -42,6 +50,9 @@ from .errors import (
     PlanError as PlanError,
     SceneDoesNotFit as SceneDoesNotFit,
     YieldError as YieldError,
+)
+from .families import (
+    made_at_will as made_at_will,
 )
 from .identification.adaptation import (
     Adaptation as Adaptation,

@@ -94,6 +94,7 @@ class OperatingPoint:
         are those of the motion at omega; one that is common to all chains at that omega makes no difference.
     error : predicted worst deviation from `target`, in units of full scale.
     lacking : one clause on what the device lacks for the target, empty when it can make it or the family says it.
+    modulated : `target` is felt in how the motion swells (`chainsim.felt_modulation`); all tones are side tones.
     """
 
     epsilon: complex
@@ -111,6 +112,7 @@ class OperatingPoint:
     margins: Margins = Margins(0.0, 0.0)
     outcome: Outcome = Outcome.OK
     lacking: str = ""
+    modulated: bool = False
 
     @property
     def moving(self) -> bool:
@@ -119,8 +121,8 @@ class OperatingPoint:
 
     @property
     def walks(self) -> bool:
-        """Whether an actuator is driven at several frequencies."""
-        return any(not tone.place for tone in self.tones)
+        """Whether several tones of one actuator are wanted, which beat as bars that walk."""
+        return any(not tone.place and not tone.side for tone in self.tones)
 
     @property
     def resting(self) -> bool:

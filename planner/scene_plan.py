@@ -58,6 +58,11 @@ def plan_scene(scene: Scene, device: Device, *, contrast_db: float | None = None
             f"yield: {device.name} says nothing of how its actuators differ; give it a spread, such as "
             "spread: {frequency: 0.01} in the device"
         )
+    if yield_ is not None and device.modulation is not None:
+        raise YieldError(
+            f"yield: {device.name} is felt by its modulation, whose yield is not planned for; leave it out, and ask "
+            "dotwave verify --as-built"
+        )
     shape = (scene.shape.rows, scene.shape.cols)
     if shape != (device.rows, device.cols):
         raise SceneDoesNotFit(
@@ -89,7 +94,7 @@ class _Frames:
 
     @cached_property
     def _expected(self) -> Expectation | None:
-        if self._device.spread is None:
+        if self._device.spread is None or self._device.modulation is not None:
             return None
         from .robustness.expected import WANTED, Expectation
 

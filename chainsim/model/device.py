@@ -16,9 +16,9 @@ from ..equations.chain import Chain
 from ..errors import ProfileError
 from ..yamlfile import read_model
 from .calibrated import Actuator, ActuatorSpread, far_off, misplaced
-from .parts import Amplifier, Coupling, Finite, Note, Positive, ProfilePart, Span, Surroundings
+from .parts import Amplifier, Coupling, Finite, Modulation, Note, Positive, ProfilePart, Span, Surroundings
 
-__all__ = ["Amplifier", "Coupling", "Device", "Note", "Span", "device_names", "load_device"]
+__all__ = ["Amplifier", "Coupling", "Device", "Modulation", "Note", "Span", "device_names", "load_device"]
 
 PROFILES = Path(__file__).parent / "profiles"
 
@@ -56,6 +56,8 @@ class Device(ProfilePart):
     actuators : what was measured of single actuators (`dotwave calibrate`). Every chain is planned with its own.
     spread : how far actuators may lie from what is known of them, ``{frequency: 0.01, damping: 0.0, beta: 0.0,
         lam: 0.0}`` (relative standard deviations); plans are then made for many such devices. None: none is known.
+    modulation : how the envelope of a carrier goes that is not felt itself; levels are then those of the modulation.
+        None: what vibrates is felt.
     surroundings : what acts on the device beside all that; plans count its `amplifier_noise` as error, `explain` and
         as-built studies all of it.
     notes : field name, or ``surroundings.`` and a name in there -> where the value comes from.
@@ -91,6 +93,7 @@ class Device(ProfilePart):
     amplifier: Amplifier
     actuators: tuple[Actuator, ...] = ()
     spread: ActuatorSpread | None = None
+    modulation: Modulation | None = None
     surroundings: Surroundings | None = None
     notes: dict[str, Note] = Field(default={})
 
@@ -106,6 +109,8 @@ class Device(ProfilePart):
             raise ValueError("coupling.scope none needs chain_length 1")
         wrong = misplaced(self.actuators, self.rows, self.cols, self.chain_length)
         wrong = wrong or far_off(self.actuators, self.f0_hz)
+        if self.modulation is not None and self.modulation.hz > self.f0_hz / 20:
+            wrong = wrong or f"modulation.hz {self.modulation.hz:g} is too fast for a carrier of {self.f0_hz:g} Hz"
         if wrong:
             raise ValueError(wrong)
         known = {*type(self).model_fields, *(f"surroundings.{name}" for name in Surroundings.model_fields)}
@@ -132,6 +137,8 @@ class Device(ProfilePart):
         for name in ("actuators", "spread"):
             if getattr(self, name):
                 raise ValueError(f"{name}: of a grid with coupling.lam_y actuators count as equal; remove {name}")
+        if self.modulation is not None:
+            raise ValueError("modulation: a grid with coupling.lam_y takes none; remove modulation")
 
     def __repr__(self) -> str:
         return f"Device({self.name!r}, {self.rows} x {self.cols})"
@@ -270,7 +277,8 @@ class Device(ProfilePart):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole profile in plain JSON types, as it stands in a manifest."""
-        left_out: dict[str, Any] = {name: True for name in ("spread", "surroundings") if getattr(self, name) is None}
+        optional = ("modulation", "spread", "surroundings")
+        left_out: dict[str, Any] = {name: True for name in optional if getattr(self, name) is None}
         if not self.grid:
             left_out["coupling"] = {"lam_y", "drives"}
         return self.model_dump(mode="json", by_alias=True, exclude=left_out)

@@ -110,6 +110,13 @@ class Amplifier(ProfilePart):
         return 0.0 if self.bits is None else self.volts / (2 ** (self.bits - 1) - 1)
 
 
+class Modulation(ProfilePart):
+    """The beat of a carrier that is too fast to be felt: its envelope goes as ``(1 + depth cos(2 pi hz t))``."""
+
+    hz: Annotated[float, Field(ge=10, le=1000)]
+    depth: Annotated[float, Field(gt=0, le=1)] = 1.0
+
+
 class Note(ProfilePart):
     """Where a value of the profile comes from."""
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from chainsim import AsBuilt, CommonAmplifier, DrawnDevices, Surroundings
-from drivers import Manifest, SampleReader
+from chainsim import AsBuilt, CommonAmplifier, Device, DrawnDevices, Surroundings, beats_of, felt_modulation
+from drivers import FrameMark, Manifest, SampleReader
 
 from ..verification import forces_under, frequencies
 
@@ -20,6 +20,8 @@ Whole = NDArray[np.int64]
 # Forces, links and weights of a block of samples stay near 8 MB each, whatever the grid.
 BLOCK_VALUES = 1 << 20
 # Numbers that are collected of all devices together, and devices that are moved at a time.
+# Tones of a modulated carrier that are told to each side of it.
+SIDES = 6
 MOST_COLLECTED, MOST_DEVICES, FEWEST_DEVICES = 8_000_000, 1024, 32
 
 
@@ -73,12 +75,16 @@ def felt_levels(
 
 def _weights(manifest: Manifest) -> int:
     """1, and cosine and sine of as many frequencies as any row of any frame has."""
-    rates = (
-        frequencies(omega, tones)
-        for mark in manifest.frames
-        for omega, tones in zip(mark.omega, mark.tones, strict=True)
-    )
+    rates = (_rates(manifest.device, mark, row) for mark in manifest.frames for row in range(manifest.device.rows))
     return 1 + 2 * max(map(len, rates), default=1)
+
+
+def _rates(device: Device, mark: FrameMark, row: int) -> list[float]:
+    """The frequencies over f0 at which motions of a row are told."""
+    omega = float(mark.omega[row])
+    if mark.modulated[row] and omega and device.modulation is not None:
+        return [omega + k * device.modulation.hz / device.f0_hz for k in range(-SIDES, SIDES + 1)]
+    return frequencies(omega, mark.tones[row])
 
 
 class _Weights:
@@ -99,8 +105,8 @@ class _Weights:
                 continue
             frame[inside] = number
             tau = index[inside] / rate_hz * manifest.device.tau_per_s
-            for row, (omega, tones) in enumerate(zip(mark.omega, mark.tones, strict=True)):
-                rates = np.array(frequencies(omega, tones))
+            for row in range(manifest.device.rows):
+                rates = np.array(_rates(manifest.device, mark, row))
                 angle = np.outer(tau, rates)
                 basis[row, inside, 0] = 1.0
                 basis[row, inside, 1 : 1 + 2 * len(rates) : 2] = np.cos(angle)
@@ -115,17 +121,39 @@ class _Weights:
         for number, mark in enumerate(manifest.frames):
             for row, tones in enumerate(mark.tones):
                 gram, sums = self._gram[number, row], load[:, number, row]
-                found[:, number, row] = _level(gram, sums, 1 + len(tones), moving=mark.moving[row])
-        return found / manifest.device.full_scale
+                if mark.modulated[row] and mark.omega[row]:
+                    found[:, number, row] = _swelling(manifest.device, gram, sums)
+                    continue
+                level = _level(gram, sums, 1 + len(tones), moving=mark.moving[row])
+                found[:, number, row] = level / manifest.device.full_scale
+        return found
+
+
+def _parts(gram: Floats, sums: Floats) -> Floats:
+    """What each weight has of the motion, shape (devices, cols, weights) as `sums`; NaN where it is not known."""
+    if gram[0, 0] < np.count_nonzero(np.diagonal(gram)):
+        return np.full(sums.shape, np.nan)
+    # A device that escaped within the frame has sums that are no numbers.
+    known = np.asarray(np.isfinite(sums).all(axis=2))[..., None]
+    wanted = np.where(known, sums, 0.0).reshape(-1, len(gram))
+    parts = np.asarray(np.linalg.lstsq(gram, wanted.T)[0]).T.reshape(sums.shape)
+    return np.where(known, parts, np.nan)
+
+
+def _swelling(device: Device, gram: Floats, sums: Floats) -> Floats:
+    """What is felt of how carriers swell: the beats of every two of their tones."""
+    assert device.modulation is not None
+    parts = _parts(gram, sums)
+    tones = parts[..., 1 : 4 * SIDES + 3 : 2] - 1j * parts[..., 2 : 4 * SIDES + 3 : 2]
+    square = [
+        2 * (tones[..., beat:] * np.conj(tones[..., :-beat])).sum(axis=-1)
+        for beat in range(1, beats_of(device.modulation) + 1)
+    ]
+    return felt_modulation(np.array(square), device.modulation, device.full_scale)
 
 
 def _level(gram: Floats, sums: Floats, tones: int, *, moving: bool) -> Floats:
     """Levels of the actuators of one row, before the scale; `sums` has shape (devices, cols, weights)."""
-    if gram[0, 0] < np.count_nonzero(np.diagonal(gram)):
-        return np.full(sums.shape[:2], np.nan)
-    # A device that escaped within the frame has sums that are no numbers.
-    known = np.asarray(np.isfinite(sums).all(axis=2))
-    wanted = np.where(known[..., None], sums, 0.0).reshape(-1, len(gram))
-    parts = np.asarray(np.linalg.lstsq(gram, wanted.T)[0]).T.reshape(sums.shape)
+    parts = _parts(gram, sums)
     wave = np.hypot(parts[..., 1 : 1 + 2 * tones : 2], parts[..., 2 : 2 + 2 * tones : 2]).sum(axis=-1)
-    return np.where(known, wave if moving else parts[..., 0], np.nan)
+    return np.asarray(wave if moving else parts[..., 0])

@@ -32,6 +32,7 @@ from .command import (
     Explain,
     Json,
     Language,
+    Modulated,
     Output,
     Pareto,
     Scheduler,
@@ -44,6 +45,7 @@ from .command import (
     Yield,
     finish as _finish,
     finish_folder,
+    finish_run,
 )
 from .completion import completed_devices, completed_texts
 from .ending import ended
@@ -103,6 +105,7 @@ def text(
     blank_between: Annotated[bool, typer.Option("--blank-between", help="A blank page between paragraphs.")] = False,
     contrast: Contrast = None,
     share: Yield = None,
+    modulation: Modulated = None,
     encoding: Annotated[str | None, typer.Option(help="Of the file's characters, such as cp1252.")] = None,
     emphasis: Annotated[EmphasisChoice | None, typer.Option(help="Of documents, written or not.")] = None,
     images: Annotated[ImageChoice | None, typer.Option(help="Of documents, as the words they bring or felt.")] = None,
@@ -136,11 +139,11 @@ def text(
     Example:
       dotwave text "Hello world" --device linked-6x6 -o hello.wav
     """
-    from ..api.scenes import device as device_of, text as text_scene
+    from ..api.scenes import text as text_scene
     from ..rendering.render import render
     from ..request import request_of
     from ..source import text_source
-    from .options import place_of, refuse, text_options
+    from .options import place_of, profile_of, refuse, text_options
 
     request = request_of(
         tol=tol, budget=budget, pareto=pareto, explain=explain, contrast_db=contrast, yield_=share,
@@ -152,13 +155,12 @@ def text(
         encoding=encoding, emphasis=emphasis, images=images, math=math, start_at=start_at, pages=pages,
         page_numbers=page_numbers,
     )  # fmt: skip
-    profile = device_of(device)
+    profile = profile_of(device, modulation)
     if os.path.isdir(source):
         given = Path(source), output, profile, options, request
         finish_folder(*given, as_json, waveforms=waveforms, workers=workers, scheduler=scheduler)
     refuse("a folder of texts", waveforms=waveforms or None, workers=workers, scheduler=scheduler)
-    report = render(text_scene(text_source(source, options), profile, options), profile, output, request)
-    _finish(report, as_json, ok=report.ok)
+    finish_run(render(text_scene(text_source(source, options), profile, options), profile, output, request), as_json)
 
 
 @app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)

@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from chainsim import Device as Profile
     from encoders import TextOptions
 
+    from ..reports.report import Report
     from ..request import Request
 
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Output", "Pareto", "Scheduler", "Tol",
-    "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder", "printable", "say",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Modulated", "Output", "Pareto",
+    "Scheduler", "Tol", "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder",
+    "finish_run", "printable", "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -63,6 +65,9 @@ Yield = Annotated[
         "--yield", min=0.0, max=1.0, help="Share of devices, drawn with the device's spread, that are to keep it."
     ),
 ]
+Modulated = Annotated[
+    str | None, typer.Option("--modulation", metavar="HZ[,DEPTH]", help="Of a carrier; none: as the device has it.")
+]
 Actuator = Annotated[
     str | None, typer.Option(metavar="ROW,COL", help="The one an .ahap or .haptic shows; none: the mean.")
 ]
@@ -92,6 +97,11 @@ def finish(report: Printable, as_json: bool, *, ok: bool) -> NoReturn:
     shown = json.dumps(report.as_dict(), ensure_ascii=False, allow_nan=False) if as_json else report.as_text()
     say(shown)
     raise typer.Exit(0 if ok else 1)
+
+
+def finish_run(report: Report, as_json: bool) -> NoReturn:
+    """As `finish`, with the exit code that the report's outcome has."""
+    finish(report, as_json, ok=report.ok)
 
 
 def finish_folder(

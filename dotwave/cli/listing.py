@@ -119,6 +119,10 @@ def _summary(device: Device) -> Iterator[str]:
     drive = f"{device.omega.min * device.f0_hz:.0f} to {device.omega.max * device.f0_hz:.0f} Hz"
     shared = "common to all chains" if device.drive == "device" else "one per chain"
     yield f"  drive: {shared}, {drive}, up to {device.amplifier.volts:g} V at {device.amplifier.rate_hz} samples/s"
+    if device.modulation is not None:
+        from ..reports.modulated import modulation_words
+
+        yield f"  modulation: {modulation_words(device)}"
     assumed = sorted(name for name, note in device.notes.items() if note.assumed)
     yield f"  assumed: {', '.join(assumed) or 'nothing'}"
 

@@ -11,9 +11,10 @@ from encoders import Grade
 from ..errors import AppError
 
 if TYPE_CHECKING:
+    from chainsim import Device
     from encoders import PictureOptions, TextOptions
 
-__all__ = ["Dots", "SampleFormat", "picture_options", "place_of", "refuse", "text_options"]
+__all__ = ["Dots", "SampleFormat", "picture_options", "place_of", "profile_of", "refuse", "text_options"]
 
 
 class Dots(StrEnum):
@@ -84,6 +85,26 @@ def refuse(what: str, **given: Any) -> None:
     for name, value in given.items():
         if value is not None:
             raise AppError(f"--{name} belongs to {what}; give that too, or leave it out")
+
+
+def profile_of(device: str, modulation: str | None) -> Device:
+    """The device of that name or file, its carriers modulated as ``HZ`` or ``HZ,DEPTH`` says.
+
+    Raises
+    ------
+    AppError, chainsim.ChainError
+        When there is no such device, or the modulation is none, or none for it.
+    """
+    from ..api.scenes import device as device_of
+
+    if modulation is None:
+        return device_of(device)
+    hz, _, depth = modulation.partition(",")
+    try:
+        given = {"hz": float(hz)} | ({"depth": float(depth)} if depth else {})
+    except ValueError:
+        raise AppError(f"--modulation: expected HZ or HZ,DEPTH such as 200 or 200,0.8, got {modulation!r}") from None
+    return device_of({"base": device, "modulation": given})
 
 
 def place_of(words: str | None) -> tuple[int, int] | None:

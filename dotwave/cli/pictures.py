@@ -11,7 +11,7 @@ import typer
 
 from encoders import picture_rules
 
-from .command import Actuator, Budget, Contrast, Device, Explain, Json, Pareto, Tol, Yes, Yield, finish, say
+from .command import Actuator, Budget, Contrast, Device, Explain, Json, Modulated, Pareto, Tol, Yes, Yield, finish, say
 from .completion import completed_files
 from .help import RENDER
 from .options import SampleFormat
@@ -57,6 +57,7 @@ def image(
     dwell: Annotated[float, typer.Option(help="Seconds a frame is shown.")] = 1.0,
     contrast: Contrast = None,
     share: Yield = None,
+    modulation: Modulated = None,
     actuator: Actuator = None,
     sample_format: Annotated[SampleFormat, typer.Option(help="Number format of the samples.")] = SampleFormat.FLOAT32,
     tol: Tol = None,
@@ -71,11 +72,10 @@ def image(
       dotwave image samples/icons/heart.svg -o heart.wav --explain steps
     """
     from ..api.pictures import image as image_scene
-    from ..api.scenes import device as device_of
     from ..rendering.render import render as render_scene
     from ..rendering.steps import write_steps
     from ..request import request_of
-    from .options import picture_options, place_of
+    from .options import picture_options, place_of, profile_of
 
     request = request_of(
         tol=tol, budget=budget, contrast_db=contrast, yield_=share, encoding=sample_format.value,
@@ -84,7 +84,7 @@ def image(
     options = picture_options(
         style=style, fit=fit, output=kind, threshold=threshold, invert=invert, edges=edges, zoom=zoom, dwell_s=dwell
     )
-    profile = device_of(device)
+    profile = profile_of(device, modulation)
     scene = image_scene(files, profile, options)
     steps = () if explain is None else write_steps(files, profile, options, explain)
     report = render_scene(scene, profile, output, request)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .command import Json, finish
+from .command import Device, Json, finish
 from .completion import completed_devices, completed_texts
 from .help import STUDY
 
@@ -107,3 +107,26 @@ def pareto(
     from ..studies.tradeoff import trade_frame
 
     finish(trade_frame(source, device=device, frame=frame, picture=picture), as_json, ok=True)
+
+
+@commands.command(short_help="Say which kinds of patterns a device makes.", rich_help_panel=STUDY)
+def reach(
+    device: Device = "paper-6x6",
+    spread: Annotated[
+        float | None, typer.Option(help="Of natural frequencies, 0.01 for 1 %: say the yield under it, too.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Plan a few patterns of every kind on a device: which it makes, how fast, how surely, at what drive.
+
+    Nothing is written. Times are ways in from rest; error, drive and well are the largest, over full scale, the
+    amplifier's volts and the edge of the softening well. The map shows which waves can stand on a chain.
+
+    \b
+    Example:
+      dotwave reach --device linked-6x6
+    """
+    from ..api.scenes import device as device_of
+    from ..studies.reach import reach_of
+
+    finish(reach_of(device_of(device), spread), as_json, ok=True)

@@ -23,6 +23,7 @@ from chainsim import (
     Coupling,
     Device,
     Located,
+    Modulation,
     Span,
     complaint_of,
     load_device,
@@ -120,6 +121,7 @@ class DevicePart(Part):
     amplifier: Amplifier | None = None
     actuators: tuple[Actuator, ...] | None = None
     spread: dict[str, float] | None = None
+    modulation: Modulation | None = None
 
     short: ClassVar[str] = "base"
 

@@ -89,6 +89,7 @@ class _Passage:
     writes: bool
     totals: Totals = field(default_factory=Totals)
     moves: dict[str, int] = field(default_factory=dict)
+    modulated: bool = False
     failure: str = ""
     lacking: tuple[str, ...] = ()
 
@@ -105,12 +106,17 @@ class _Passage:
                     self.moves.setdefault(
                         f"it never settles, and beats {depth:.2g} deep every {period_s:.3g} s", number
                     )
+            self.modulated |= any(state.modulated for state in frame.states)
             yield frame
 
     def notes(self) -> Iterator[str]:
         """A line for every way to move on, with its first frame; then what is lacking for the first that failed."""
         for move, number in self.moves.items():
             yield f"Frame {number}: {move}."
+        if self.modulated:
+            from ..reports.modulated import modulation_words
+
+            yield f"Felt as carriers swell: {modulation_words(self.plan.device)}."
         yield from filter(None, (self.failure, *self.lacking))
 
     def _pace(self, frame: FramePlan) -> str:

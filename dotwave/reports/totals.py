@@ -88,3 +88,17 @@ def nearest_lines(frame: FramePlan, device: Device) -> Iterator[str]:
     levels = np.array([np.abs(state.phasor + state.mean) for state in frame.states]) / device.full_scale
     for row in levels.reshape(device.rows, device.cols):
         yield "  " + " ".join(f"{100 * level:3.0f}" for level in row)
+    yield from _others(frame, device)
+
+
+def _others(frame: FramePlan, device: Device) -> Iterator[str]:
+    """The built-in devices that make patterns of this kind at will, by their families alone."""
+    from chainsim import device_names, load_device
+    from planner import made_at_will
+
+    if frame.frame is None:
+        return
+    pattern = frame.frame.pattern
+    names = [name for name in device_names() if name != device.name and made_at_will(pattern, load_device(name))]
+    if names:
+        yield f"Built-in devices that make such patterns: {', '.join(names)}; `dotwave reach` says how well."

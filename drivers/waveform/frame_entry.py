@@ -47,7 +47,9 @@ def frame_entry(device: Device, frame: FramePlan, number: int) -> dict[str, Any]
     mark |= {key: value for key, value in rare.items() if value}
     if frame.frame.travels:
         mark["smoothness"] = SMOOTHNESS
-    if any(state.tones for state in frame.states):
+    if any(state.modulated for state in frame.states):
+        mark["modulated"] = [any(state.modulated for state in row) for row in rows]
+    if any(state.walks for state in frame.states):
         mark["tones"] = [sorted({tone.omega for state in row for tone in state.tones if not tone.side}) for row in rows]
     if any(state.beats is not None for state in frame.states):
         mark["beats"] = [next((state.beats for state in row if state.beats is not None), None) for row in rows]

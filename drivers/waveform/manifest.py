@@ -61,6 +61,7 @@ class FrameMark:
     span : (start, end) of `text` in the source.
     beats : for each row depth and period in seconds of a motion that never settles, None where it does; empty where all
         rows do. Their targets are the loudest that passes by.
+    modulated : for each row whether its target is felt in how a carrier swells, as the device's `modulation` says.
     goes_on, number : which cells are not of the text: where words of the page go on, and the page's number.
     smoothness : where the pattern travels, order of the smooth step that levels go along over the whole of the frame,
         from those of the frame before to these (`encoders.crossing`); else 0.
@@ -84,6 +85,7 @@ class FrameMark:
     number: PageNumber | None = None
     smoothness: int = 0
     beats: tuple[tuple[float, float] | None, ...] = ()
+    modulated: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True)

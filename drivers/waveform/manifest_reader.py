@@ -86,6 +86,7 @@ class _Frame(_Part):
     tones: list[list[Positive]] | None = None
     phase: list[list[Finite | None]] | None = None
     moving: list[bool] | None = None
+    modulated: list[bool] | None = None
     goes_on: list[_GoesOn] = []
     number: _PageNumber | None = None
     smoothness: Literal[0, 9] = 0
@@ -220,9 +221,12 @@ class _Check:
             self._refuse(f"{place}.omega", f"expected {rows} numbers, one for each row, got {len(frame.omega)}")
         if len(frame.target) != rows or any(len(row) != cols for row in frame.target):
             self._refuse(f"{place}.target", f"expected {rows} rows of {cols} numbers")
-        for name, value in (("tones", frame.tones), ("moving", frame.moving), ("beats", frame.beats)):
+        lists = {"tones": frame.tones, "moving": frame.moving, "modulated": frame.modulated, "beats": frame.beats}
+        for name, value in lists.items():
             if value is not None and len(value) != rows:
                 self._refuse(f"{place}.{name}", f"expected {rows} entries, one for each row, got {len(value)}")
+        if any(frame.modulated or ()) and self._device.modulation is None:
+            self._refuse(f"{place}.modulated", "the device has no modulation")
         for name, grid in (("wish", frame.wish), ("phase", frame.phase)):
             if grid is not None and (len(grid) != rows or any(len(row) != cols for row in grid)):
                 self._refuse(f"{place}.{name}", f"expected {rows} rows of {cols} numbers or null")
@@ -274,6 +278,7 @@ def _mark(frame: _Frame, device: Device) -> FrameMark:
         tones=tuple(tuple(row) for row in frame.tones or [[]] * device.rows),
         phase=_frozen(_with_nan(frame.phase or any_phase)),
         moving=_moving(frame, device),
+        modulated=tuple(frame.modulated or [False] * device.rows),
         wish=FrameWish(wish, frame.contrast_db, bool(frame.cells.strip())),
         goes_on=tuple(GoesOn(one.run, one.mark, one.restated, one.ending, one.left_out) for one in frame.goes_on),
         number=None if frame.number is None else PageNumber(frame.number.at, frame.number.cells),
