@@ -12,12 +12,15 @@ from chainsim.continuation.spectrum import critical_lam, delta_from_critical_lam
 from .page import BLUE, GREEN, GREY, ORANGE, RED, Finding, Page, sheet
 
 PAPER = 6.13e-3
+# The paper's number has three digits: anything between these is written so.
+ROUNDED = (6.125e-3, 6.135e-3)
 N = 6
 
 
 def figure(out: Path) -> Page:
     """Draw Fig. 4 and compare."""
     delta = delta_from_critical_lam(PAPER, N)
+    low, high = (delta_from_critical_lam(end, N) for end in ROUNDED)
     lam = np.linspace(0, 0.012, 601)
     modes = 2 * np.pi * np.arange(N) / N
     growth = spectrum_curve(delta, lam[:, None], modes)[..., 0].real
@@ -49,6 +52,7 @@ def figure(out: Path) -> Page:
         right.set(title="(c) open chain: best gain per stage", xlabel="λ · 10³", ylabel="|z(m)| / |z(m-1)|")
 
     sheet(out, "fig4", (1, 3), (12, 3.8), paint)
+    apart(out, delta)
     return Page(
         "fig4",
         "Fig. 4: stability of the equilibrium",
@@ -57,11 +61,34 @@ def figure(out: Path) -> Page:
         "and it needs the ring, which the paper's equation (2) and its figure 3 do not have. An open chain has no "
         "such instability at all; there the same condition is where the gain per stage passes 1, so that a wave "
         "grows from actuator to actuator. The paper says `the amplitude grows rapidly` past the critical value: "
-        "both do that.",
+        "both do that. `fig4_apart.png` has the spectrum of every actuator of the open chain and of every wave of the "
+        "ring by itself: an actuator of the open chain stays at -δ/2 whatever λ is.",
         [
             Finding("critical λ, ring of six", f"{critical_lam(delta, N):.4e}", "6.13e-3"),
             Finding("critical λ, n → ∞ (δ + δ²/2)", f"{critical_lam(delta):.4e}"),
             Finding("damping δ (inferred)", f"{delta:.4e}", "not given"),
+            Finding("δ by the rounding of 6.13e-3", f"{low:.4e} .. {high:.4e} (Q {1 / high:.1f} .. {1 / low:.1f})"),
             Finding("unstable phase lags just beyond", "60° and 120°", "2π/6 and 2π/3 (states 1 and 2)"),
         ],
     )
+
+
+def apart(out: Path, delta: float) -> None:
+    """Draw what the equilibrium's spectrum is made of, an actuator or a wave each, for λ from 0 to twice critical."""
+    lam = np.linspace(0, 2 * PAPER, 201)
+    waves = spectrum_curve(delta, lam[:, None], 2 * np.pi * np.arange(N) / N)[..., 0]
+
+    def paint(axes: Any) -> None:
+        for m, (above, below) in enumerate(axes.T):
+            # The first actuator is fed by no other; each of the rest hangs on one link.
+            own = -delta / 2 + 1j * np.sqrt(1 + (lam if m else 0 * lam) - delta**2 / 4)
+            for ax, values, name in ((above, own, f"P{m + 1}, open"), (below, waves[:, m], f"{60 * m}°, ring")):
+                ax.plot(values.real * 1e3, (values.imag - 1) * 1e3, color=BLUE)
+                ax.plot(values[0].real * 1e3, (values[0].imag - 1) * 1e3, "o", ms=3, color=GREY)
+                ax.axvline(0, color=RED, lw=0.8, ls="--")
+                ax.set(title=name, xlim=(-15, 5), ylim=(-7, 14))
+            below.set_xlabel("Re μ · 10³")
+        for ax in axes[:, 0]:
+            ax.set_ylabel("(Im μ - 1) · 10³")
+
+    sheet(out, "fig4_apart", (2, N), (13, 4.5), paint)

@@ -90,12 +90,13 @@ def _paint_states(axes: Any, states: tuple[State, State], tau: Any, walk: Comple
 
     colors = colormaps["viridis"](np.linspace(0, 0.9, 6))
     cycle = np.linspace(0, 4 * np.pi, 400)
-    for ax, state in zip(axes[:2], states, strict=True):
+    for ax, state, degrees in zip(axes[:2], states, (60, 120), strict=True):
         for m in range(6):
             wave = (state.phasor[m] * np.exp(1j * cycle)).real
             ax.plot(cycle / (2 * np.pi), wave, "-" if m < 3 else "--", color=colors[m], label=f"P{m + 1}")
         lags = ", ".join(f"{lag:.0f}" for lag in state.lags)
-        ax.set(title=f"{state.name} open chain, ε = {state.epsilon:g}\nlags {lags}°", xlabel="cycles", ylabel="z")
+        chosen = f"{state.name} open chain, ε = {state.epsilon:g}, chosen for {degrees}° at ω = 1"
+        ax.set(title=f"{chosen}\nlags {lags}°", xlabel="cycles", ylabel="z")
     axes[0].set_ylim(-0.095, None)
     axes[0].legend(ncols=6, fontsize=7, loc="lower center", handlelength=1.2, columnspacing=0.8)
     lag = -np.degrees(np.angle(walk[:, 1:] * walk[:, :-1].conj()))

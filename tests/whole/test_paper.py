@@ -76,6 +76,30 @@ def test_a_figure_says_what_is_inferred(tmp_path, paper):
 
 
 @plotting
+def test_the_layers_imply_a_beam_whose_linear_peak_comes_near_its_length(delta, paper):
+    beam = paper("beam").beam_of(133.13, 100.0)
+    # Rayleigh's quotient of the clamped beam's mode, integrated here, gives the frequency back.
+    x, k, s = np.linspace(0, beam.length_m, 20001), 1.8751 / beam.length_m, 0.734096
+    bend = k**2 * (np.cosh(k * x) + np.cos(k * x) - s * (np.sinh(k * x) + np.sin(k * x)))
+    move = np.cosh(k * x) - np.cos(k * x) - s * (np.sinh(k * x) - np.sin(k * x))
+    z = np.linspace(0, 260.35e-6, 200001)
+    kapton = (z < 19.05e-6) | (z > 222.25e-6)
+    stiffness = 2 * np.trapezoid(np.where(kapton, 2.5e9, 61e9) * z**2, z)
+    mass = 2 * np.trapezoid(np.where(kapton, 1420.0, 7750.0), z)
+    omega2 = stiffness * np.trapezoid(bend**2, x) / (mass * np.trapezoid(move**2, x))
+    assert np.sqrt(omega2) / (2 * np.pi) == pytest.approx(133.13, rel=1e-3)
+    # The first mode's share of what the piezo's moment bends, integrated the same way.
+    moment = 2 * np.trapezoid(np.where(kapton, 0.0, 61e9 * 171e-12 * 100 / (2 * 203.2e-6)) * z, z)
+    tip = move[-1] * moment * np.trapezoid(bend, x) / (mass * omega2 * np.trapezoid(move**2, x))
+    assert beam.tip_m == pytest.approx(tip, rel=2e-3)
+    assert 0.5 * beam.length_m < beam.tip_m / delta < beam.length_m
+
+
+def test_three_digits_of_the_critical_value_leave_a_band_of_damping(paper):
+    low, high = (delta_from_critical_lam(end, 6) for end in paper("equilibrium").ROUNDED)
+    assert (low, high) == pytest.approx((5.2963e-3, 5.3049e-3), rel=1e-4)
+
+
 @pytest.mark.slow
 def test_one_command_makes_every_figure(tmp_path):
     subprocess.run([sys.executable, "-m", "samples.paper", str(tmp_path)], cwd=ROOT, check=True, capture_output=True)
