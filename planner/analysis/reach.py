@@ -10,7 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chainsim import ActuatorSpread, Device, Outcome
-from encoders import Frame, GridShape, Region, Scene, TargetPattern, bars, levels, plane_wave, regions, walking_bars
+from encoders import (
+    Frame,
+    GridShape,
+    Region,
+    Scene,
+    TargetPattern,
+    bars,
+    levels,
+    plane_wave,
+    regions,
+    unlocked,
+    walking_bars,
+)
 
 from ..errors import DwellTooShort
 from ..plan import FramePlan
@@ -74,6 +86,7 @@ KINDS = (
     ReachKind("waves", _waves((90.0, 0.0), (60.0, 0.0))),
     ReachKind("waves from row to row", _waves((90.0, 45.0))),
     ReachKind("waves in regions", _regions),
+    ReachKind("beats", lambda shape: [unlocked(shape, depth=0.3, period_s=1.6)]),
 )
 
 

@@ -21,11 +21,11 @@ def makers(pattern: object) -> set[str]:
 
 
 def test_makers_of_patterns_by_families_alone() -> None:
-    any_levels = {"independent-6x6", "linked-6x6", "linked-ultrasonic-6x6"}
+    any_levels = {"independent-6x6", "linked-6x6", "linked-grid-6x6", "linked-ultrasonic-6x6"}
     static = {"paper-6x6", "paper-6x6-common"}
     assert makers(levels(np.eye(6))) == any_levels | static
     waves = {"independent-6x6", "linked-6x6", "linked-ultrasonic-6x6", "paper-6x6", "ultrasonic-6x6"}
-    assert makers(plane_wave(GRID, lag_deg=60)) == waves
+    assert makers(plane_wave(GRID, lag_deg=60)) == {*waves, "grid-6x6"}
     assert makers(walking_bars(GRID, width=2)) == waves
     assert makers(bars(GridShape(40, 96), vertical=True, width=1, gap=1)) == {"linked-40x96"}
 
