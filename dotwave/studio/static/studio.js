@@ -1,0 +1,92 @@
+// Live updates for pages that also work without this. Nothing here moves the focus out of a field.
+
+const said = document.querySelector("#said");
+const say = (words) => { if (said.textContent !== words) said.textContent = words; };
+
+// A complaint that came with the page is what to read first.
+document.querySelector("[data-focus]")?.focus();
+
+// Work that is going on: its progress in words, a bar, and the page anew once it is over.
+for (const box of document.querySelectorAll("[data-progress]")) {
+  const source = new EventSource(box.dataset.progress);
+  const bar = box.querySelector("progress"), words = box.querySelector("[data-words]");
+  let told = "";
+  source.onmessage = (event) => {
+    const now = JSON.parse(event.data);
+    words.textContent = now.words;
+    if (now.percent === null) bar.removeAttribute("value"); else bar.value = now.percent;
+    // Few words aloud: a new stage, and the end.
+    const stage = now.words.split(":")[0];
+    if (stage !== told) { told = stage; say(stage); }
+    if (now.over) { source.close(); renew("#main", location.href, now.error || "Done."); }
+  };
+}
+
+// Puts the same part of another answer in place of what stands here, keeping the focus where it was.
+async function renew(part, address, words) {
+  const answer = await fetch(address, { headers: { "X-Part": part } });
+  const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+  const fresh = page.querySelector(part), here = document.querySelector(part);
+  if (!fresh || !here) return;
+  const kept = document.activeElement?.id, inside = here.contains(document.activeElement);
+  here.replaceChildren(...fresh.childNodes);
+  if (inside) (document.getElementById(kept) ?? here).focus();
+  if (words) say(words);
+  steppers();
+}
+
+// Forms that answer while one types: the part they name is made anew.
+for (const form of document.querySelectorAll("form[data-live]")) {
+  let busy = false, again = false;
+  const ask = async () => {
+    if (busy) { again = true; return; }
+    busy = true;
+    const address = `${form.getAttribute("action")}?${new URLSearchParams(new FormData(form))}`;
+    await renew(form.dataset.live, address, "");
+    history.replaceState(null, "", address);
+    performance.mark("answered");
+    const summary = document.querySelector(`${form.dataset.live} [data-summary]`);
+    clearTimeout(form.quiet);
+    form.quiet = setTimeout(() => summary && say(summary.textContent.trim()), 700);
+    busy = false;
+    if (again) { again = false; ask(); }
+  };
+  form.addEventListener("input", (event) => {
+    // A slider and its number field say the same.
+    const twin = event.target.dataset.twin && document.getElementById(event.target.dataset.twin);
+    if (twin) twin.value = event.target.value;
+    ask();
+  });
+}
+
+// Frames one by one: play, pause, step. Without this all stand below each other.
+function steppers() {
+  for (const box of document.querySelectorAll("[data-stepper]:not([data-ready])")) {
+    box.dataset.ready = "";
+    const frames = [...document.querySelectorAll(`#${box.dataset.stepper} > li`)];
+    const controls = box.querySelector("[hidden]"), where = box.querySelector("[data-where]");
+    let at = 0, timer = null;
+    const go = (to) => {
+      frames[at].removeAttribute("aria-current");
+      at = Math.max(0, Math.min(frames.length - 1, to));
+      frames[at].setAttribute("aria-current", "step");
+      where.textContent = `Frame ${at + 1} of ${frames.length}: ${frames[at].dataset.words}`;
+    };
+    const play = box.querySelector("[data-play]");
+    const pause = () => { clearTimeout(timer); timer = null; play.textContent = "Play"; };
+    const next = () => {
+      timer = setTimeout(() => { if (at + 1 < frames.length) { go(at + 1); next(); } else pause(); },
+        1000 * Number(frames[at].dataset.seconds));
+    };
+    play.onclick = () => {
+      if (timer) { pause(); return; }
+      if (at + 1 === frames.length) go(0);
+      play.textContent = "Pause"; next();
+    };
+    box.querySelector("[data-back]").onclick = () => { pause(); go(at - 1); };
+    box.querySelector("[data-on]").onclick = () => { pause(); go(at + 1); };
+    controls.hidden = false;
+    go(0);
+  }
+}
+steppers();
