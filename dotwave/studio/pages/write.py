@@ -33,8 +33,9 @@ CHOICES = {"undefined": Undefined, "presentation": Presentation, "page_numbers":
 
 
 def _form(request: Request, given: dict[str, Any] | None = None, why: str = "") -> Response:
-    given = {**EMPTY, "device": studio_of(request).device, **(given or {})}
-    find = request.query_params.get("find", "")
+    asked = request.query_params
+    given = {**EMPTY, "device": studio_of(request).device, **(given or {"table": asked.get("table", USUAL_TABLE)})}
+    find = asked.get("find", "")
     found = _tables(find)
     tables = [one for one in found[:MOST_TABLES] if one.file != given["table"]]
     values = {

@@ -6,6 +6,9 @@ const say = (words) => { if (said.textContent !== words) said.textContent = word
 // A complaint that came with the page is what to read first.
 document.querySelector("[data-focus]")?.focus();
 
+// What only works with this is hidden without it.
+for (const one of document.querySelectorAll("[data-script]")) one.hidden = false;
+
 // Work that is going on: its progress in words, a bar, and the page anew once it is over.
 for (const box of document.querySelectorAll("[data-progress]")) {
   const source = new EventSource(box.dataset.progress);
@@ -24,7 +27,7 @@ for (const box of document.querySelectorAll("[data-progress]")) {
 
 // Puts the same part of another answer in place of what stands here, keeping the focus where it was.
 async function renew(part, address, words) {
-  const answer = await fetch(address, { headers: { "X-Part": part } });
+  const answer = await fetch(address);
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.querySelector(part), here = document.querySelector(part);
   if (!fresh || !here) return;
@@ -58,6 +61,12 @@ for (const form of document.querySelectorAll("form[data-live]")) {
     ask();
   });
 }
+
+// A choice that is made in one form and kept by another.
+addEventListener("change", (event) => {
+  const keeping = document.querySelector(`[data-keeps="${event.target.name}"]`);
+  if (keeping) keeping.value = event.target.value;
+});
 
 // Frames one by one: play, pause, step. Without this all stand below each other.
 function steppers() {
