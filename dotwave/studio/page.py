@@ -18,7 +18,7 @@ from .tasks import Tasks
 
 __all__ = ["PAGES", "Studio", "StudioPage", "pages", "show", "studio_of"]
 
-PAGES = ("write", "chain")
+PAGES = ("write", "chain", "device")
 """Modules of `dotwave.studio.pages`, in the order of the navigation."""
 
 

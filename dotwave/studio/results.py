@@ -84,6 +84,12 @@ class Results:
             file.write(json.dumps(told, ensure_ascii=False).encode())
         return Result(folder, page, title, dict(asked))
 
+    def remove(self, result: Result) -> None:
+        """Take away one that could not be begun, with what was put into it."""
+        for path in result.folder.iterdir():
+            path.unlink()
+        result.folder.rmdir()
+
     def find(self, name: str) -> Result:
         """The result of that name.
 

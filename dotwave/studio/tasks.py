@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -58,15 +59,15 @@ class Running:
         """Ask it to end, as Ctrl-C would."""
         pipe = self.process.stdin
         if pipe is not None and not pipe.closed:
-            try:
+            with suppress(BrokenPipeError):
                 pipe.close()
-            except BrokenPipeError:
-                return
 
     def listen(self, lines: IO[str]) -> None:
         """Follow what it says until it ends."""
-        for line in lines:
-            self._hear(json.loads(line))
+        with lines:
+            for line in lines:
+                self._hear(json.loads(line))
+        self.stop()
         if self.process.wait() and not self.error:
             self.error = ENDED
         self.over = True

@@ -19,7 +19,7 @@ from ..progress import told_to
 
 __all__ = ["WORK", "main"]
 
-WORK = ("write",)
+WORK = ("device", "write")
 """Modules of `dotwave.studio.work`; each has ``do(folder, asked)``, which gives plain JSON types."""
 
 SAY_EVERY_S = 0.05

@@ -11,11 +11,11 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 
-from chainsim import device_names
 from drivers import atomic_file
 from encoders import PageNumbering, Presentation, TableInfo, Undefined, list_tables, text_suffixes
 
 from ...errors import AppError, bad_input
+from ..devices import device_choices, device_path
 from ..page import StudioPage, show, studio_of
 from ..results import Result
 
@@ -40,7 +40,7 @@ def _form(request: Request, given: dict[str, Any] | None = None, why: str = "") 
     tables = [one for one in found[:MOST_TABLES] if one.file != given["table"]]
     values = {
         "given": given, "why": why, "find": find, "tables": tables, "more": max(0, len(found) - MOST_TABLES),
-        "devices": [(name, name) for name in device_names()], "suffixes": text_suffixes(),
+        "devices": device_choices(studio_of(request)), "suffixes": text_suffixes(),
         "choices": {name: [(one.value, one.value) for one in kind] for name, kind in CHOICES.items()},
     }  # fmt: skip
     return show(request, "write.html", values, here="write", status=400 if why else 200)
@@ -76,11 +76,9 @@ async def _asked(request: Request, form: FormData, given: dict[str, str]) -> Res
         raise AppError(f"Text: more than {MOST_LETTERS} letters; give it as a document")
     options = {name: given[name] for name in (*CHOICES, "pages") if given.get(name)}
     asked: dict[str, Any] = {
-        "device": given.get("device", ""), "text": "" if file else text, "source": "", "name": "",
-        "options": options | {"table": given.get("other_table", "").strip() or given.get("table", USUAL_TABLE)},
+        "device": device_path(studio_of(request), given.get("device", "")), "text": "" if file else text,
+        "source": "", "name": "", "options": options | {"table": given.get("table", USUAL_TABLE)},
     }  # fmt: skip
-    if asked["device"] not in device_names():
-        raise AppError(f"Device: there is no {asked['device']!r}; choose one of the list")
     if file is None:
         return studio_of(request).results.begin("write", " ".join(text.split())[:60], asked)
     # Of the name only the ending is used; its words are shown.
