@@ -18,7 +18,7 @@ from .tasks import Tasks
 
 __all__ = ["PAGES", "Studio", "StudioPage", "pages", "show", "studio_of"]
 
-PAGES = ("write", "chain", "device")
+PAGES = ("write", "device", "chain", "play")
 """Modules of `dotwave.studio.pages`, in the order of the navigation."""
 
 
@@ -75,5 +75,9 @@ def show(
     request: Request, template: str, values: Mapping[str, Any] | None = None, *, status: int = 200, here: str = ""
 ) -> Response:
     """A page made of a template; `here` is the page of the navigation it belongs to."""
-    context = {"pages": request.app.state.pages, "here": here, **(values or {})}
-    return studio_of(request).templates.TemplateResponse(request, template, context, status_code=status)
+    studio = studio_of(request)
+    playing = studio.tasks.playing()
+    for running in playing:
+        running.look()
+    context = {"pages": request.app.state.pages, "here": here, "playing": bool(playing), **(values or {})}
+    return studio.templates.TemplateResponse(request, template, context, status_code=status)

@@ -1,4 +1,4 @@
-"""How far work is, as server-sent events; and the button that ends it."""
+"""How far work is, as server-sent events; the buttons that end it; and whether anybody looks while it plays."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 from collections.abc import AsyncIterator
 
 from starlette.requests import Request
-from starlette.responses import RedirectResponse, Response, StreamingResponse
+from starlette.responses import JSONResponse, RedirectResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
 from .page import studio_of
@@ -24,6 +24,8 @@ def progress_routes() -> tuple[BaseRoute, ...]:
         Route("/progress/{name}", _progress),
         Route("/cancel/{name}", _cancel, methods=["POST"]),
         Route("/stop", _stop, methods=["POST"]),
+        Route("/watch", _watch),
+        Route("/left", _left, methods=["POST"]),
     )
 
 
@@ -64,6 +66,21 @@ def _cancel(request: Request) -> Response:
 
 def _stop(request: Request) -> Response:
     """End all that plays; harmless when nothing does."""
-    for running in studio_of(request).tasks.going_on("play"):
+    for running in studio_of(request).tasks.playing():
         running.stop()
     return RedirectResponse("/play?stopped", 303)
+
+
+def _watch(request: Request) -> Response:
+    """A page says that it is there; what plays goes on."""
+    playing = studio_of(request).tasks.playing()
+    for running in playing:
+        running.look()
+    return JSONResponse({"playing": bool(playing)})
+
+
+def _left(request: Request) -> Response:
+    """A page was closed."""
+    for running in studio_of(request).tasks.playing():
+        running.leave()
+    return Response(status_code=204)

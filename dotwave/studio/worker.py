@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
@@ -19,8 +20,11 @@ from ..progress import told_to
 
 __all__ = ["WORK", "main"]
 
-WORK = ("device", "write")
-"""Modules of `dotwave.studio.work`; each has ``do(folder, asked)``, which gives plain JSON types."""
+WORK = ("device", "emulator", "live", "play", "write")
+"""Modules of `dotwave.studio.work`; each has ``do(folder, asked, tell)``, which gives plain JSON types.
+
+`tell` takes what there is to see meanwhile, also plain JSON types.
+"""
 
 SAY_EVERY_S = 0.05
 
@@ -38,6 +42,10 @@ class _Line:
         if now - self._last >= SAY_EVERY_S:
             self._last = now
             self.say(label=label, done=done, total=total)
+
+    def show(self, shown: Mapping[str, Any]) -> None:
+        """What there is to see."""
+        self.say(shown=dict(shown))
 
     def say(self, **told: Any) -> None:
         """One object."""
@@ -69,7 +77,7 @@ def main() -> int:
     refusals: tuple[type[Exception], ...] = (*bad_input(), OSError)
     try:
         with told_to(line.progress):
-            answer = import_module(f".work.{order['work']}", __package__).do(folder, order["asked"])
+            answer = import_module(f".work.{order['work']}", __package__).do(folder, order["asked"], line.show)
         with atomic_file(folder / "answer.json") as file:
             file.write(json.dumps(answer, ensure_ascii=False).encode())
     except KeyboardInterrupt:

@@ -9,20 +9,60 @@ document.querySelector("[data-focus]")?.focus();
 // What only works with this is hidden without it.
 for (const one of document.querySelectorAll("[data-script]")) one.hidden = false;
 
-// Work that is going on: its progress in words, a bar, and the page anew once it is over.
+// Work that is going on: its progress in words, a bar, what is felt, and the page anew once it is over. Hidden tabs hold
+// no connection: browsers have few of them, and STOP needs one.
 for (const box of document.querySelectorAll("[data-progress]")) {
-  const source = new EventSource(box.dataset.progress);
   const bar = box.querySelector("progress"), words = box.querySelector("[data-words]");
-  let told = "";
-  source.onmessage = (event) => {
+  let told = "", source = null;
+  const hear = (event) => {
     const now = JSON.parse(event.data);
     words.textContent = now.words;
     if (now.percent === null) bar.removeAttribute("value"); else bar.value = now.percent;
+    mirror(now.shown);
     // Few words aloud: a new stage, and the end.
     const stage = now.words.split(":")[0];
     if (stage !== told) { told = stage; say(stage); }
-    if (now.over) { source.close(); renew("#main", location.href, now.error || "Done."); }
+    if (now.over) { source.close(); source = null; box.remove(); renew("#main", location.href, now.error || "Done."); }
   };
+  const open = () => {
+    if (document.hidden) { source?.close(); source = null; }
+    else if (!source && box.isConnected) { source = new EventSource(box.dataset.progress); source.onmessage = hear; }
+  };
+  document.addEventListener("visibilitychange", open);
+  open();
+}
+
+// What is felt now: the words stand still for whoever reads them, and are not said aloud.
+function mirror(shown) {
+  const seen = document.querySelector("[data-seen]"), place = document.querySelector("[data-mirror]");
+  if (seen && shown.words && seen.textContent !== shown.words) seen.textContent = shown.words;
+  const list = document.querySelector("[data-lines]");
+  if (list && shown.lines) list.replaceChildren(...shown.lines.filter(Boolean).map((line) => {
+    const item = document.createElement("li"); item.textContent = line; return item;
+  }));
+  if (!place || !shown.levels) return;
+  const rows = shown.levels.length, cols = shown.levels[0].length, name = "http://www.w3.org/2000/svg";
+  if (!place.firstChild) {
+    const svg = document.createElementNS(name, "svg");
+    const set = { viewBox: `0 0 ${cols} ${rows}`, width: 24 * cols, height: 24 * rows, "aria-hidden": "true" };
+    for (const [key, value] of Object.entries(set)) svg.setAttribute(key, value);
+    for (let at = 0; at < rows * cols; at++) for (const kind of ["dot", "felt"]) {
+      const disc = document.createElementNS(name, "circle");
+      const about = { class: kind, cx: at % cols + 0.5, cy: Math.floor(at / cols) + 0.5, r: kind === "dot" ? 0.42 : 0,
+        "stroke-width": 0.05 };
+      for (const [key, value] of Object.entries(about)) disc.setAttribute(key, value);
+      svg.append(disc);
+    }
+    place.append(svg);
+  }
+  const discs = place.querySelectorAll(".felt");
+  shown.levels.flat().forEach((level, at) => discs[at].setAttribute("r", 0.42 * Math.sqrt(Math.min(level, 1.2))));
+}
+
+// While something plays a page says that it is there, and when it goes: with the last one the outputs go to zero.
+if (document.body.dataset.playing) {
+  setInterval(() => fetch("/watch").catch(() => {}), 2000);
+  addEventListener("pagehide", () => navigator.sendBeacon("/left"));
 }
 
 // Puts the same part of another answer in place of what stands here, keeping the focus where it was.

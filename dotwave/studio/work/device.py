@@ -14,6 +14,7 @@ from chainsim import Chain, Device, Setting, load_device, solve
 from ...api.plans import plan
 from ...api.scenes import texture
 from ...progress import progress
+from .tell import Tell
 
 __all__ = ["do"]
 
@@ -22,7 +23,7 @@ SHARES = (0.01, 0.1, 1.0)
 TOL = 1e-3
 
 
-def do(folder: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
+def do(folder: Path, asked: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     """The curves of the profile in `folder`, and which patterns it makes, plain JSON types."""
     device = load_device(str(folder / asked["profile"]))
     resonance = [_resonance(device, share) for share in SHARES]

@@ -16,13 +16,14 @@ from ...rendering.render import render
 from ...reports.spoken import spoken
 from ...reports.text import FrameCheck, TextReport
 from ...request import Request
+from .tell import Tell
 
 __all__ = ["do"]
 
 WAVEFORM, OTHER = "text.wav", "text.hjif"
 
 
-def do(folder: Path, asked: Mapping[str, Any]) -> dict[str, Any]:
+def do(folder: Path, asked: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     """Render what is asked into `folder` and say what is felt, plain JSON types.
 
     Parameters
