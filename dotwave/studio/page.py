@@ -18,7 +18,7 @@ from .tasks import Tasks
 
 __all__ = ["PAGES", "Studio", "StudioPage", "pages", "show", "studio_of"]
 
-PAGES = ("write", "device", "chain", "play")
+PAGES = ("write", "pictures", "device", "chain", "tradeoff", "play")
 """Modules of `dotwave.studio.pages`, in the order of the navigation."""
 
 

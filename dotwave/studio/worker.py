@@ -20,7 +20,7 @@ from ..progress import told_to
 
 __all__ = ["WORK", "main"]
 
-WORK = ("device", "emulator", "live", "play", "write")
+WORK = ("device", "emulator", "icons", "live", "play", "tradeoff", "write")
 """Modules of `dotwave.studio.work`; each has ``do(folder, asked, tell)``, which gives plain JSON types.
 
 `tell` takes what there is to see meanwhile, also plain JSON types.

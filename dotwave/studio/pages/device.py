@@ -18,6 +18,7 @@ from ..devices import PROFILE, device_choices, device_path
 from ..page import Studio, StudioPage, show, studio_of
 from ..profile_form import profile_fields, profile_of
 from ..results import Result
+from ..uploads import words_of_form
 
 __all__ = ["PAGE"]
 
@@ -33,7 +34,7 @@ def _form(request: Request, typed: dict[str, str] | None = None, why: str = "") 
 
 async def _save(request: Request) -> Response:
     async with request.form(max_files=0, max_fields=100) as form:
-        typed = {name: value for name, value in form.items() if isinstance(value, str)}
+        typed = words_of_form(form)
     try:
         result = await run_in_threadpool(_saved, studio_of(request), typed)
     except bad_input() as error:

@@ -17,6 +17,7 @@ from ...errors import AppError, bad_input
 from ..devices import device_choices, device_path
 from ..page import Studio, StudioPage, show, studio_of
 from ..results import Result
+from ..uploads import words_of_form
 
 __all__ = ["PAGE"]
 
@@ -54,7 +55,7 @@ def _ports(studio: Studio) -> list[tuple[str, str]]:
 
 async def _begin(request: Request) -> Response:
     async with request.form(max_files=0, max_fields=20) as form:
-        given = {name: value for name, value in form.items() if isinstance(value, str)}
+        given = words_of_form(form)
     try:
         work = given.get("work", "")
         if work not in WORKS:

@@ -6,18 +6,18 @@ from pathlib import PurePath
 from typing import Any
 
 from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import FormData, UploadFile
+from starlette.datastructures import FormData
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 
-from drivers import atomic_file
 from encoders import PageNumbering, Presentation, TableInfo, Undefined, list_tables, text_suffixes
 
 from ...errors import AppError, bad_input
 from ..devices import device_choices, device_path
 from ..page import StudioPage, show, studio_of
 from ..results import Result
+from ..uploads import ending_of, file_of, keep, words_of_form
 
 __all__ = ["PAGE"]
 
@@ -56,7 +56,7 @@ def _tables(find: str) -> list[TableInfo]:
 
 async def _begin(request: Request) -> Response:
     async with request.form(max_files=1, max_fields=40, max_part_size=4 * MOST_LETTERS) as form:
-        given = {name: value for name, value in form.items() if isinstance(value, str)}
+        given = words_of_form(form)
         try:
             result = await _asked(request, form, given)
         except bad_input() as error:
@@ -67,8 +67,7 @@ async def _begin(request: Request) -> Response:
 
 async def _asked(request: Request, form: FormData, given: dict[str, str]) -> Result:
     """The result that is to be made, with the document in its folder."""
-    document = form.get("document")
-    file = document if isinstance(document, UploadFile) and document.filename else None
+    file = file_of(form, "document")
     text = given.get("text", "")
     if not (file or text.strip()):
         raise AppError("Text: is empty; type something, or choose a document")
@@ -81,16 +80,11 @@ async def _asked(request: Request, form: FormData, given: dict[str, str]) -> Res
     }  # fmt: skip
     if file is None:
         return studio_of(request).results.begin("write", " ".join(text.split())[:60], asked)
-    # Of the name only the ending is used; its words are shown.
+    ending = ending_of(file, text_suffixes(), "Document")
     name = PurePath(file.filename or "").name
-    ending = next((one for one in text_suffixes() if name.lower().endswith(one)), None)
-    if ending is None:
-        raise AppError(f"Document: {name!r} has another ending than {', '.join(text_suffixes())}")
     asked |= {"source": f"document{ending}", "name": name[:100]}
     result = studio_of(request).results.begin("write", name[:60], asked)
-    with atomic_file(result.folder / asked["source"]) as copy:
-        while piece := await file.read(1 << 20):
-            copy.write(piece)
+    await keep(file, result.folder / asked["source"])
     return result
 
 
