@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-__all__ = ["Update", "progress", "told_to"]
+__all__ = ["Update", "listening", "progress", "told_to"]
 
 PATIENCE_S = 2.0
 
@@ -66,7 +66,7 @@ def progress(label: str) -> Iterator[Update]:
     ----------
     label : what is being done, in a word or two.
     """
-    listener = _listener.get()
+    listener = listening()
     if listener is not None:
         yield lambda done, total=None: listener(label, done, total)
         return
@@ -78,6 +78,11 @@ def progress(label: str) -> Iterator[Update]:
         yield bar
     finally:
         bar.close()
+
+
+def listening() -> Listener | None:
+    """Who listens; None where nobody does."""
+    return _listener.get()
 
 
 @contextmanager

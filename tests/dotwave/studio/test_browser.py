@@ -1,97 +1,24 @@
-"""The studio in a real browser: by keyboard alone, without a fault that axe-core finds, narrow, quick."""
+"""The studio in a real browser: by keyboard alone, without a fault that axe-core finds, narrow, light."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import shutil
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[3]
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-AXE = Path(os.environ.get("AXE_CORE", ROOT / "out/axe/node_modules/axe-core/axe.min.js"))
-NEEDED = [name for name in ("playwright", "starlette", "uvicorn", "httpx2") if importlib.util.find_spec(name) is None]
+from tests.support.studio_browser import (
+    LOOKS,
+    addresses,
+    faults,
+    faults_of,
+    looked_at,
+    needs_axe,
+    needs_browser,
+    tab_to,
+    wider_than_narrow,
+)
 
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="needs a browser: sudo apt-get install chromium"),
-    pytest.mark.skipif(bool(NEEDED), reason=f"needs {', '.join(NEEDED)}: pip install"),
-]
-needs_axe = pytest.mark.skipif(not AXE.is_file(), reason="needs axe-core: npm install --prefix out/axe axe-core")
-
-LOOKS: dict[str, dict[str, Any]] = {
-    "light": {"color_scheme": "light"},
-    "dark": {"color_scheme": "dark"},
-    "forced": {"forced_colors": "active", "color_scheme": "dark"},
-}
-
-
-@pytest.fixture(scope="module")
-def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    from tests.support.studio import served
-
-    with served(tmp_path_factory.mktemp("studio")) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield started
-        started.close()
-
-
-@pytest.fixture(scope="module")
-def page(browser: Any, studio: Any) -> Iterator[Any]:
-    """A page that was let in."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900})
-    opened = context.new_page()
-    opened.goto(studio.keys.first_address)
-    yield opened
-    context.close()
-
-
-@pytest.fixture(scope="module")
-def written(page: Any, studio: Any) -> str:
-    """The address of a text that was written by keyboard alone."""
-    page.goto(f"{studio.keys.origin}/write")
-    tab_to(page, "#text")
-    page.keyboard.type("Hello world")
-    tab_to(page, "#find")
-    page.keyboard.type("german contr")
-    page.wait_for_selector("#table-1")
-    tab_to(page, "main button.main")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#frames", timeout=120_000)
-    return str(page.url)
-
-
-def tab_to(page: Any, selector: str, most: int = 60) -> None:
-    """Press Tab until that element has the focus."""
-    for _ in range(most):
-        page.keyboard.press("Tab")
-        if page.evaluate("wanted => document.activeElement.matches(wanted)", selector):
-            return
-    raise AssertionError(f"{selector} is not reached by Tab")
-
-
-def faults(page: Any) -> list[str]:
-    """What axe-core finds, a line for each element."""
-    if not page.evaluate("() => 'axe' in window"):
-        # Not by a script tag: the pages allow scripts of their own alone.
-        page.evaluate(AXE.read_text(encoding="utf-8"))
-    found = page.evaluate("async () => (await axe.run(document)).violations")
-    return [f"{one['id']}: {node['html'][:160]}" for one in found for node in one["nodes"]]
-
-
-def addresses(studio: Any) -> list[str]:
-    return ["/", *(f"/{one.name}" for one in studio.app.state.pages)]
+pytestmark = needs_browser
 
 
 def test_a_text_is_written_by_keyboard_alone(page: Any, written: str) -> None:
@@ -124,28 +51,12 @@ def test_a_setting_is_tried_by_keyboard_alone(page: Any, studio: Any) -> None:
 
 def test_stop_is_the_first_stop_of_the_tab_key(page: Any, studio: Any) -> None:
     for address in addresses(studio):
-        page.goto(studio.keys.origin + address)
+        page.goto(address)
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.id") == "stop", address
         page.keyboard.press("Tab")
         page.keyboard.press("Enter")
         assert page.evaluate("document.activeElement.id") == "main", address
-
-
-@needs_axe
-@pytest.mark.parametrize("look", LOOKS)
-def test_no_fault_on_any_page(browser: Any, page: Any, studio: Any, written: str, look: str) -> None:
-    context = browser.new_context(storage_state=page.context.storage_state(), **LOOKS[look])
-    other = context.new_page()
-    found = []
-    for address in (*addresses(studio), "/nothing", "/write?find=german", "/chain?omega=x", "/chain?omega=0.995"):
-        other.goto(studio.keys.origin + address)
-        found += [f"{address}: {fault}" for fault in faults(other)]
-    other.goto(written)
-    other.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-    found += [f"written: {fault}" for fault in faults(other)]
-    context.close()
-    assert not found, "\n".join(found[:40])
 
 
 @needs_axe
@@ -157,29 +68,6 @@ def test_a_planted_fault_is_found(page: Any, studio: Any) -> None:
     assert {"label", "html-has-lang"} <= found
 
 
-def test_nothing_is_wider_than_a_narrow_window(browser: Any, page: Any, studio: Any, written: str) -> None:
-    context = browser.new_context(
-        storage_state=page.context.storage_state(), viewport={"width": 320, "height": 640}, reduced_motion="reduce"
-    )
-    narrow = context.new_page()
-    for address in [*(studio.keys.origin + one for one in addresses(studio)), written]:
-        narrow.goto(address)
-        assert narrow.evaluate("document.documentElement.scrollWidth") <= 320, address
-    context.close()
-
-
-def test_the_pages_work_without_scripts(browser: Any, page: Any, studio: Any, written: str) -> None:
-    context = browser.new_context(storage_state=page.context.storage_state(), java_script_enabled=False)
-    plain = context.new_page()
-    plain.goto(f"{studio.keys.origin}/chain")
-    plain.fill("#epsilon", "0")
-    plain.click("main button")
-    assert "epsilon=0" in plain.url
-    plain.goto(written)
-    assert plain.locator("#frames > li").count() == 2
-    context.close()
-
-
 def test_the_first_page_is_light(page: Any, studio: Any) -> None:
     sizes: list[int] = []
     page.on("response", lambda answer: sizes.append(len(answer.body())))
@@ -187,3 +75,25 @@ def test_the_first_page_is_light(page: Any, studio: Any) -> None:
     page.wait_for_load_state("networkidle")
     assert 3 <= len(sizes) <= 6
     assert sum(sizes) <= 60_000
+
+
+def test_the_pages_work_without_scripts(page: Any, studio: Any, written: str) -> None:
+    with looked_at(page, java_script_enabled=False) as plain:
+        plain.goto(f"{studio.keys.origin}/chain")
+        plain.fill("#epsilon", "0")
+        plain.click("main button")
+        assert "epsilon=0" in plain.url
+        plain.goto(written)
+        assert plain.locator("#frames > li").count() == 2
+
+
+@needs_axe
+@pytest.mark.parametrize("look", LOOKS)
+def test_no_fault_on_any_page(page: Any, studio: Any, written: str, look: str) -> None:
+    states = ("/nothing", "/write?find=german", "/chain?omega=x", "/chain?omega=0.995")
+    found = faults_of(page, [*addresses(studio), *(studio.keys.origin + one for one in states), written], look)
+    assert not found, "\n".join(found[:40])
+
+
+def test_nothing_is_wider_than_a_narrow_window(page: Any, studio: Any, written: str) -> None:
+    assert not wider_than_narrow(page, [*addresses(studio), written])
