@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 __all__ = [
-    "LOOKS", "ROOT", "addresses", "faults", "faults_of", "looked_at", "needs_axe", "needs_browser", "opened", "tab_to",
-    "wider_than_narrow", "written",
+    "LOOKS", "ROOT", "TRANSFERRED", "addresses", "faults", "faults_of", "looked_at", "needs_axe", "needs_browser",
+    "opened", "tab_to", "wider_than_narrow", "written",
 ]  # fmt: skip
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,6 +34,11 @@ LOOKS: dict[str, dict[str, Any]] = {
     "forced": {"forced_colors": "active", "color_scheme": "dark"},
 }
 NARROW: dict[str, Any] = {"viewport": {"width": 320, "height": 640}, "reduced_motion": "reduce"}
+
+
+# Bytes that came over the wire for the page as it stands.
+TRANSFERRED = """() => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
+  .reduce((sum, one) => sum + one.transferSize, 0)"""
 
 
 @contextmanager

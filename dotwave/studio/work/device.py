@@ -61,12 +61,9 @@ def _static(device: Device) -> dict[str, Any] | None:
         return None
     chain = Chain(n=1, delta=device.delta, beta=device.beta)
     volts = np.linspace(0.0, device.amplifier.volts, POINTS)
-    found = solve(
-        chain,
-        Setting.of(chain, epsilon=0.0, bias=(volts * device.bias_per_volt)[:, np.newaxis]),
-        tol=TOL,
-        rung="static",
-    )
+    bias = (volts * device.bias_per_volt)[:, np.newaxis]
+    setting = Setting.of(chain, epsilon=0.0, lam=0.0, omega=1.0, bias=bias)
+    found = solve(chain, setting, tol=TOL, rung="static", start="rest")
     fine = np.array([one.value == "ok" for one in found.outcome])
     return {
         "name": "deflection", "x": volts.tolist(),

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from drivers import DriverError
 from encoders import TextSource
 
 from ...api.felt import Felt, verify
@@ -46,7 +47,11 @@ def do(folder: Path, asked: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
     }  # fmt: skip
     if not report.files:
         return answer
-    written(OTHER)
+    try:
+        written(OTHER)
+    except DriverError as error:
+        # Patterns that stand still are no vibration; all else of the text is there.
+        answer["lines"].append(f"No haptic file: {error}.")
     felt = verify(folder / WAVEFORM)
     write_preview(felt, folder / "text")
     return answer | _felt(felt)
