@@ -70,11 +70,11 @@ def steps_of(path: Path, device: Device, options: PictureOptions) -> dict[str, A
     steps = explain_picture(path, shape, options)
     scene = encode_picture(path, shape, options)
     felt = np.abs(next(iter(scene.frames)).pattern.amplitude)
-    first = scene.report.frames[0]
+    first, raised = scene.report.frames[0], felt >= 0.5
     return {
         "steps": [{"name": step.name, "source": _embedded(step.pixels())} for step in steps],
-        "levels": felt.tolist(), "raised": (felt >= 0.5).tolist(), "words": in_words((felt >= 0.5) * 1.0),
-        "braille": in_braille((felt >= 0.5) * 1.0), "similarity": scene.report.similarity, "doubt": first.doubt,
+        "levels": felt.tolist(), "raised": raised.tolist(), "words": in_words(raised.astype(np.float64)),
+        "braille": in_braille(raised.astype(np.float64)), "similarity": scene.report.similarity, "doubt": first.doubt,
         "notes": list(scene.report.notes), "style": str(scene.report.style), "frames": len(scene.report.frames),
     }  # fmt: skip
 

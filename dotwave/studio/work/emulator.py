@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from drivers import ControllerSpec, Emulator
 
 from ...api.scenes import device as device_of
@@ -51,5 +53,6 @@ def _seen(emulator: Emulator) -> dict[str, Any]:
     # What rings down after the end is not integrated any more.
     levels = 0.0 * status.levels if emulator.idle else status.levels.round(2)
     state = status.state.name.lower()
-    words = f"{state} at {status.played_s:.1f} s, {status.underruns} underruns. {in_words((levels >= RAISED) * 1.0)}"
+    felt = in_words((levels >= RAISED).astype(np.float64))
+    words = f"{state} at {status.played_s:.1f} s, {status.underruns} underruns. {felt}"
     return {"port": emulator.port, "words": words, "levels": levels.tolist(), "volts": round(status.peak_volts, 2)}

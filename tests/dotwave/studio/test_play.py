@@ -59,7 +59,7 @@ class Pages:
         return running
 
     def at_zero(self) -> bool:
-        return self.stand_in.shown["volts"] == 0.0
+        return bool(self.stand_in.shown["volts"] == 0.0)
 
 
 @pytest.fixture(scope="module")
