@@ -18,9 +18,9 @@ commands = typer.Typer(rich_markup_mode=None)
 @commands.command(short_help="Everything in local web pages.", rich_help_panel=SET_UP)
 def studio(
     device: Device = "linked-6x6",
-    folder: Annotated[
-        Path, typer.Option("--folder", help="Where results are kept; nothing is written elsewhere.")
-    ] = Path("dotwave-studio"),
+    folder: Annotated[Path, typer.Option("--folder", help="Where results are kept, a folder each.")] = Path(
+        "dotwave-studio"
+    ),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of this machine; 0: any that is free.")] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only say the address.")] = False,
     as_json: Json = False,

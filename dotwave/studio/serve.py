@@ -104,6 +104,8 @@ def _listening(port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((LOOPBACK, port))
+        # A browser that is quicker than the server waits for it.
+        listening.listen()
     except OSError as error:
         listening.close()
         raise AppError(f"--port {port}: {error.strerror}; leave it out for one that is free") from None

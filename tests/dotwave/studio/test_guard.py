@@ -148,10 +148,8 @@ def test_it_listens_on_loopback_alone() -> None:
     listening = _listening(0)
     assert listening.getsockname()[0] == "127.0.0.1"
     port = listening.getsockname()[1]
-    with listening:
-        listening.listen()
-        with pytest.raises(AppError, match=f"--port {port}: .*leave it out"):
-            _listening(port)
+    with listening, pytest.raises(AppError, match=f"--port {port}: .*leave it out"):
+        _listening(port)
 
 
 def test_a_start_page_names_every_page(client: TestClient) -> None:

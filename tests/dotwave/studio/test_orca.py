@@ -43,7 +43,7 @@ def test_a_setting_is_changed_by_what_orca_shows(tmp_path: Path) -> None:
         bus = {"DBUS_SESSION_BUS_ADDRESS": (tmp_path / "bus").read_text().strip()}
         # Without an address bar, which would have the focus.
         browser = playwright.chromium.launch_persistent_context(
-            tmp_path / "profile", executable_path=CHROMIUM, headless=False, env=environment | bus,
+            tmp_path / "profile", executable_path=CHROMIUM, headless=False, env={**environment, **bus},
             args=["--no-sandbox", "--force-renderer-accessibility", f"--app={studio.keys.first_address}"],
         )  # fmt: skip
         page = browser.pages[0]
