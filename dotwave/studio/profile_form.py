@@ -80,10 +80,10 @@ def _fields(
         note = notes.get(name) or notes.get(name.split(".")[0]) or {}
         source = f"{'assumed' if note['assumed'] else 'given'} because: {note['why']}" if note else ""
         lines = name in LISTS
+        usual = "YAML" if lines else "a choice" if "enum" in rule else "dimensionless"
         shown = yaml.safe_dump(value, sort_keys=False, allow_unicode=True) if lines and value else _typed(value)
         yield ProfileField(
-            name, shown, UNITS.get(name, "YAML" if lines else "dimensionless"), _span(rule),
-            tuple(rule.get("enum", ())), source, lines,
+            name, shown, UNITS.get(name, usual), _span(rule), tuple(rule.get("enum", ())), source, lines,
         )  # fmt: skip
 
 
