@@ -1,19 +1,26 @@
-"""A bar on stderr for whatever takes more than two seconds; silent when stderr is not a terminal."""
+"""A bar on stderr for whatever takes more than two seconds; silent when stderr is not a terminal.
+
+A program without a terminal may listen instead (`told_to`).
+"""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol, cast
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-__all__ = ["Update", "progress"]
+__all__ = ["Update", "listening", "progress", "told_to"]
 
 PATIENCE_S = 2.0
+
+Listener = Callable[[str, float, float | None], None]
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 
 class Update(Protocol):
@@ -59,6 +66,10 @@ def progress(label: str) -> Iterator[Update]:
     ----------
     label : what is being done, in a word or two.
     """
+    listener = listening()
+    if listener is not None:
+        yield lambda done, total=None: listener(label, done, total)
+        return
     if not sys.stderr.isatty():
         yield lambda done, total=None: None
         return
@@ -67,3 +78,18 @@ def progress(label: str) -> Iterator[Update]:
         yield bar
     finally:
         bar.close()
+
+
+def listening() -> Listener | None:
+    """Who listens; None where nobody does."""
+    return _listener.get()
+
+
+@contextmanager
+def told_to(listener: Listener) -> Iterator[None]:
+    """While the body runs, `listener` is called with label, done and total in place of a bar."""
+    before = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(before)

@@ -278,7 +278,7 @@ def doctor(as_json: Json = False) -> None:
 @cache
 def application() -> typer.Typer:
     """All commands."""
-    for name in ("pictures", "study", "plan", "play", "live"):
+    for name in ("pictures", "study", "plan", "play", "live", "studio"):
         app.add_typer(import_module(f".{name}", __package__).commands)
     return app
 

@@ -1,4 +1,4 @@
-"""How far a set of icons is: a bar with rate and time left, on a terminal only."""
+"""How far a set of icons is: a bar with rate and time left on a terminal, or told to whoever listens."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+from ..progress import Update, listening, progress
 
 __all__ = ["icon_progress"]
 
@@ -16,6 +18,10 @@ def icon_progress(label: str, total: int) -> Iterator[Callable[[bool], None]]:
 
     Only the former count for the rate.
     """
+    if listening() is not None:
+        with progress(label) as update:
+            yield _counted(update, total)
+        return
     if not sys.stderr.isatty():
         yield lambda worked: None
         return
@@ -35,3 +41,14 @@ def icon_progress(label: str, total: int) -> Iterator[Callable[[bool], None]]:
             bar.update(task, completed=ready + done, pace=pace)
 
         yield step
+
+
+def _counted(update: Update, total: int) -> Callable[[bool], None]:
+    done = 0
+
+    def step(worked: bool) -> None:
+        nonlocal done
+        done += 1
+        update(done, total)
+
+    return step

@@ -85,7 +85,7 @@ def test_the_wheel_is_complete(built: Path) -> None:
     (wheel,) = built.glob("dotwave-*.whl")
     with zipfile.ZipFile(wheel) as archive:
         inside = set(archive.namelist())
-    data = {".py", ".pyi", ".yaml", ".md", ".h", ".c", ".ld", ".xz"}
+    data = {".py", ".pyi", ".yaml", ".md", ".h", ".c", ".ld", ".xz", ".html", ".css", ".js"}
     wanted = {
         str(path.relative_to(ROOT))
         for name in PACKAGES

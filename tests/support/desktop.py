@@ -64,6 +64,13 @@ class Desktop:
 def desktop(folder: Path, number: int, *buttons: str) -> Iterator[Desktop]:
     """Start everything, with Orca as a client of BrlAPI server `number`; all of it ends with the body."""
     (folder / "dialog.py").write_text(DIALOG)
+    with session_of(folder, number, f"exec /usr/bin/python3 -u dialog.py {' '.join(buttons)}") as (session, _):
+        yield Desktop(session)
+
+
+@contextmanager
+def session_of(folder: Path, number: int, program: str) -> Iterator[tuple[subprocess.Popen[str], dict[str, str]]]:
+    """A session with Orca in which a line of shell runs, which has to say ``ready``; and its environment."""
     read, write = os.pipe()
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
@@ -77,11 +84,10 @@ def desktop(folder: Path, number: int, *buttons: str) -> Iterator[Desktop]:
         "DISPLAY": display, "HOME": str(folder), "XDG_RUNTIME_DIR": str(folder), "BRLAPI_HOST": f"127.0.0.1:{number}",
         "GTK_MODULES": "gail:atk-bridge", "NO_AT_BRIDGE": "0", "PYTHONPATH": "",
     }  # fmt: skip
-    names = " ".join(buttons)
     line = (
         "gsettings set org.gnome.desktop.interface toolkit-accessibility true 2>/dev/null; openbox >openbox.log 2>&1 & "
         "orca --replace --enable=braille --disable=speech >orca.log 2>&1 & "
-        f"exec /usr/bin/python3 -u dialog.py {names}"
+        f"{program}"
     )
     with (folder / "session.log").open("w") as log:
         session = subprocess.Popen(
@@ -92,7 +98,7 @@ def desktop(folder: Path, number: int, *buttons: str) -> Iterator[Desktop]:
         assert session.stdout is not None
         # The registry of the accessibility bus says a word there too.
         assert "ready\n" in iter(session.stdout.readline, ""), (folder / "session.log").read_text()
-        yield Desktop(session)
+        yield session, environment
     finally:
         os.killpg(session.pid, signal.SIGKILL)
         session.communicate()

@@ -1,0 +1,3 @@
+"""The pages, one module each, with a `PAGE`."""
+
+__all__: list[str] = []
