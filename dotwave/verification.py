@@ -16,7 +16,7 @@ from chainsim import AsBuilt, Device
 from drivers import FrameMark, Manifest, Role, read_waveform
 from encoders import FeltPage, back_check, covered_emphases, covered_text, emphases_of, emphases_within, read_cells
 
-from .beating import Envelope
+from .beating import RowEnvelope
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
 
@@ -155,7 +155,7 @@ class _Fit:
         self._load = [np.zeros((size, device.cols)) for size in sizes]
         self._squares = np.zeros((device.rows, device.cols))
         self._envelopes = {
-            row: Envelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
+            row: RowEnvelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
             for row, beats in enumerate(mark.beats) if beats is not None
         }  # fmt: skip
 

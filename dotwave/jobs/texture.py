@@ -73,7 +73,7 @@ class Walking(Part):
         return self
 
 
-class Unlocked(Part):
+class UnlockedPart(Part):
     """A motion that never settles (`encoders.unlocked`)."""
 
     depth: Annotated[float, Field(gt=0, le=1)]
@@ -103,7 +103,7 @@ class TexturePart(Part):
     wave: WavePart | None = None
     bars: Bars | None = None
     walking_bars: Walking | None = None
-    unlocked: Unlocked | None = None
+    unlocked: UnlockedPart | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
     dwell_s: Seconds = 2.0
