@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from planner import AMPLITUDE_ERROR_LIMIT
 
-__all__ = ["Envelope"]
+__all__ = ["RowEnvelope"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -18,7 +18,7 @@ LOOK = 4
 LOUD_OFF = 0.1
 
 
-class Envelope:
+class RowEnvelope:
     """The amplitudes of one row, collected block by block.
 
     Parameters
@@ -51,7 +51,7 @@ class Envelope:
         loud : float64, shape (cols,), the loudest that is aimed at, dimensionless.
         beats : depth and period in seconds that are asked.
         """
-        from planner.waves.beats import DEPTH_OFF, PERIOD_OFF, beats_of
+        from planner import beats_of, beats_off
 
         if len(self._counts) < 10:
             nothing = np.full(len(loud), np.nan)
@@ -59,8 +59,6 @@ class Envelope:
         # The last look is not whole.
         amplitude = 2 * np.abs(self._sums[:-1] / np.maximum(self._counts[:-1, None], 1.0))
         found = beats_of(amplitude, self._look_s)
-        off = max(
-            abs(float(found.depth) - beats[0]) / DEPTH_OFF, abs(float(found.period_s) / beats[1] - 1) / PERIOD_OFF
-        )
+        off = float(beats_off(found, *beats))
         each = np.maximum(np.abs(found.loud / np.maximum(loud, 1e-300) - 1) / LOUD_OFF, off)
         return found.loud / full_scale, AMPLITUDE_ERROR_LIMIT * each

@@ -25,7 +25,7 @@ from encoders import (
     read_page,
 )
 
-from .beating import Envelope
+from .beating import RowEnvelope
 from .progress import progress
 from .reports.text import FrameCheck, VerifyReport
 from .swelling import Swelling
@@ -186,7 +186,7 @@ class _Fit:
         self._load = [np.zeros((size, device.cols)) for size in sizes]
         self._squares = np.zeros((device.rows, device.cols))
         self._envelopes = {
-            row: Envelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
+            row: RowEnvelope(float(mark.omega[row]) * device.tau_per_s, (self.stop - self.first) / rate_hz, device.cols)
             for row, beats in enumerate(mark.beats) if beats is not None
         }  # fmt: skip
         self._modulated = np.array(mark.modulated)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from chainsim import Chain, Device, Response
 
-from .closed_forms.joint import driven
 from .closed_forms.links import stages
 from .drive import closed
 from .operating_point import Margins, OperatingPoint
@@ -62,7 +61,7 @@ def noise_error(device: Device, point: OperatingPoint, *, rounding: bool = True)
     stiffest = own.stiffness + (4 * lam if law.both_ways else lam)
     low, high = float(np.sqrt(np.min(own.stiffness if law.both_ways else stiffest))), float(np.sqrt(np.max(stiffest)))
     omega = np.linspace(max(low - WIDTHS * device.delta, 0.05), high + WIDTHS * device.delta, POINTS)
-    gain = np.abs(driven(chain, lam, omega).T if law.both_ways else _passed_on(chain, lam, omega)) ** 2
+    gain = np.abs(_passed_on(chain, lam, omega)) ** 2
     rate = device.amplifier.rate_hz / device.tau_per_s
     density = (step**2 / 12 * (2 * np.sin(omega / rate / 2)) ** 4 + added**2) / (np.pi * rate)
     return float(np.sqrt(np.trapezoid(density * gain, omega, axis=1).max()))
@@ -70,6 +69,11 @@ def noise_error(device: Device, point: OperatingPoint, *, rounding: bool = True)
 
 def _passed_on(chain: Chain, lam: Floats, omega: Floats) -> Complexes:
     """Small motions under a unit force on the first, stage by stage; round a ring over and over. complex128, (n, W)."""
+    if chain.law.both_ways:
+        # Imported here: most chains act one way.
+        from .closed_forms.joint import driven
+
+        return driven(chain, lam, omega).T
     own = stages(chain)
     stage = (own.stiffness + lam)[:, None] - omega**2 + 1j * np.multiply.outer(own.delta, omega)
     forward = np.concatenate([[1.0], lam[1:]])

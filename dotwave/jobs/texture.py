@@ -81,7 +81,7 @@ class Walking(Part):
         return self
 
 
-class Unlocked(Part):
+class UnlockedPart(Part):
     """A motion that never settles (`encoders.unlocked`)."""
 
     depth: Annotated[float, Field(gt=0, le=1)]
@@ -113,7 +113,7 @@ class TexturePart(Part):
     slanted_bars: SlantedBars | None = None
     rings: Rings | None = None
     walking_bars: Walking | None = None
-    unlocked: Unlocked | None = None
+    unlocked: UnlockedPart | None = None
     levels: tuple[tuple[Annotated[float, Field(ge=0, le=1)], ...], ...] | None = None
     regions: tuple[RegionPart, ...] | None = None
     scroll: ScrollPart | None = None

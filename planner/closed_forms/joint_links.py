@@ -21,14 +21,14 @@ from chainsim import Chain
 
 from .links import links_for, stage_constant, stages
 
-__all__ = ["Held", "links_between", "links_both_ways", "links_round"]
+__all__ = ["HeldLinks", "links_between", "links_both_ways", "links_round"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Wholes = NDArray[np.intp]
 
 
-class Held(NamedTuple):
+class HeldLinks(NamedTuple):
     """C settings that hold amplitudes, in one harmonic.
 
     Attributes
@@ -44,12 +44,12 @@ class Held(NamedTuple):
     phasor: Complexes
     epsilon: Complexes
 
-    def part(self, at: Wholes | NDArray[np.bool_]) -> Held:
+    def part(self, at: Wholes | NDArray[np.bool_]) -> HeldLinks:
         """Some of them."""
-        return Held(self.profile[at], self.lam[at], self.phasor[at], self.epsilon[at])
+        return HeldLinks(self.profile[at], self.lam[at], self.phasor[at], self.epsilon[at])
 
 
-def links_round(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> Held:
+def links_round(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> HeldLinks:
     """The links up to `lam_max` of a ring that hold profiles of amplitudes; as `links_both_ways`.
 
     The closing link is set like the first.
@@ -62,10 +62,10 @@ def links_round(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -
     for m in range(chain.n - 1, 0, -1):
         phasor[:, m - 1] = phasor[:, m] * (1 + stage[:, m] / lam[:, m - 1])
     epsilon = stage[:, 0] * phasor[:, 0] - lam[:, 0] * (phasor[:, -1] - phasor[:, 0])
-    return Held(profile, lam, phasor, epsilon)
+    return HeldLinks(profile, lam, phasor, epsilon)
 
 
-def links_both_ways(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> Held:
+def links_both_ways(chain: Chain, amplitude: Floats, omega: float, lam_max: float) -> HeldLinks:
     """All links up to `lam_max` that hold profiles of amplitudes at `omega`, whatever the phases.
 
     From the last oscillator up, ``|A_m + mu J_m| = a_{m-1}`` is a quadratic for mu. A step down towards the end has
@@ -92,7 +92,7 @@ def links_both_ways(chain: Chain, amplitude: Floats, omega: float, lam_max: floa
         lam[:, m - 1] = 1 / mu[good]
         phasor[:, m - 1] = phasor[:, m] + mu[good] * carried[at]
         carried = carried[at] + stage[profile, m - 1] * phasor[:, m - 1]
-    return Held(profile, lam, phasor, carried)
+    return HeldLinks(profile, lam, phasor, carried)
 
 
 def _roots(here: Complexes, carried: Complexes, wanted: Floats) -> tuple[Floats, Floats]:

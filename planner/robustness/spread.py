@@ -106,10 +106,7 @@ class Draws:
                 For a grid, or links that act both ways: their spread is not judged.
         """
         if chain.closure is Closure.BIDIRECTIONAL or chain.rows > 1:
-            raise SpreadError(
-                f"spread: expected an open chain or a ring, got {chain.closure} with {chain.rows} rows; "
-                "leave spread out of the device"
-            )
+            raise SpreadError(f"spread: not judged in {chain.law.name}s; leave spread out of the device")
         f0, delta, beta, lam = self.normal
         return BatchParts(
             stiffness=_column(chain.stiffness) * _positive(1 + spread.f0 * f0) ** 2,

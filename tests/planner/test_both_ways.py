@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainsim import Chain, Closure, Device, Outcome, load_device
+from chainsim import Chain, Closure, Device, DrawnDevices, Outcome, ProfileError, Surroundings, load_device
 from dotwave.verification import verify
 from drivers import write_waveform
+from drivers.protocol.plant import TruePlant
+from drivers.protocol.plant_file import PlantError, PlantFile
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import plan_scene
 from planner.closed_forms.joint import driven, growth, sensitivity
@@ -104,16 +106,29 @@ def test_what_is_held_is_felt(device: Device, row: str) -> None:
     assert np.abs(gone).max() < 1.1e-3 * device.full_scale
 
 
+@pytest.mark.slow
 def test_what_no_links_hold_is_refused_with_the_nearest() -> None:
     held = of(LINKED, "000101")
     assert held.outcome is Outcome.UNREACHABLE
     assert "no links of this chain hold it" in held.lacking
     assert 0.02 < held.error < 1
+
+
+def test_waves_are_refused_with_the_nearest() -> None:
     wave = WaveTarget.of(np.full(6, 0.5), np.angle(np.exp(-1j * np.pi / 2 * np.arange(6))), np.ones(6))
     (point,) = Planner(ONE_LAM, 20.0).points([wave])
     assert point.outcome is Outcome.UNREACHABLE
+    assert point.lacking
+    assert 0.02 < point.error < 0.5
     (walk,) = Planner(ONE_LAM, 20.0).points([WalkingTarget((0.3,) * 6, weight=(1.0,) * 6, width=2.0)])
     assert walk.lacking.endswith("it lacks links that act one way")
+
+
+def test_what_does_not_know_such_links_says_so() -> None:
+    with pytest.raises(ProfileError, match="links act one way"):
+        DrawnDevices(LINKED, Surroundings(), first=0, count=8, seed=0, rate_hz=24000, frames=1, weights=1)
+    with pytest.raises(PlantError, match="links that act one way"):
+        TruePlant(PlantFile(), LINKED, 24000)
 
 
 def test_through_the_file(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from planner import plan_scene
 from planner.planner import Planner
 from planner.targets import UnlockedTarget
 from planner.waves import unlocked as module
-from planner.waves.beats import DEPTH_OFF, PERIOD_OFF, beats_of
+from planner.waves.beats import beats_of, beats_off
 from planner.waves.unlocked import Unlocked
 from tests.support.joint_motion import Step, felt_after
 
@@ -80,8 +80,7 @@ def test_beats_under_an_integrator_of_its_own(depth: float, period_s: float) -> 
     assert (point.outcome, point.lacking) == (Outcome.OK, "")
     (felt,) = felt_after(RING, [Step(family.enter(point, True), point, 30.0)], rtol=1e-8)
     found = beats_of(np.abs(felt), 1 / (point.omega * RING.f0_hz))
-    assert abs(float(found.depth) - depth) <= DEPTH_OFF
-    assert abs(float(found.period_s) / period_s - 1) <= PERIOD_OFF
+    assert beats_off(found, depth, period_s) <= 1
 
 
 @pytest.mark.parametrize(("depth", "period_s"), [(0.0, 1.0), (1.1, 1.0), (0.5, 0.0), (0.5, float("inf"))])
