@@ -56,7 +56,7 @@ class Modulated(RisingFamily):
         carriers = whole._carriers if isinstance(whole, Modulated) else None
         # How actuators differ is not counted on here.
         known = device.model_copy(update={"spread": None})
-        self._carriers = Vibration(known, contrast_db / 2, kinds, carriers)
+        self._carriers: Vibration = Vibration(known, contrast_db / 2, kinds, carriers)
 
     @classmethod
     def of(
