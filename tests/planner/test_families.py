@@ -107,7 +107,7 @@ def test_a_new_family_is_one_file_and_one_line(monkeypatch: pytest.MonkeyPatch) 
     module = ModuleType("jumps")
     vars(module)["Jumps"] = Jumps
     monkeypatch.setitem(sys.modules, "jumps", module)
-    line = Row("jumps", (AmplitudeTarget,), biased, "jumps", "Jumps")
+    line = Row("jumps", (AmplitudeTarget,), biased, biased, "jumps", "Jumps")
     monkeypatch.setattr(families_module, "FAMILIES", (line, *FAMILIES))
     frame = Frame(TargetPattern(np.eye(6, dtype=np.complex128)), 1.0)
     plans = list(plan_scene(Scene(GridShape(6, 6), [frame]), DEVICES["paper-6x6"]).frames)
