@@ -34,7 +34,8 @@ are alone there is none, for any phases can be made.
 
 A scene that cannot be made names the built-in devices that make such patterns.
 
-The rest of this page is made by `python benchmarks/reach.py`, with a spread of 0.3 %{without}.
+The rest of this page is made by `python benchmarks/reach.py`, with a spread of 0.3 %{without}. Devices without
+a section have not been measured yet.
 """
 
 

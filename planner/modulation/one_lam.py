@@ -160,7 +160,7 @@ def _followed(
     sizes = np.tile(np.abs(small) + 1e-3 * np.abs(small).max(), 2)
 
     def felt(x: Floats, scale: float) -> Floats:
-        last = np.asarray(scale * device.full_scale * (x[:half] + 1j * x[half:]), dtype=np.complex128)
+        last: Complexes = np.asarray(scale * device.full_scale * (x[:half] + 1j * x[half:]), np.complex128)
         with np.errstate(over="ignore", invalid="ignore"):
             motion = driven(device.chain, links, omega, step, last, one).motion[:, :, 0]
             found = felt_modulation(beats_in(motion, beats), beat, scale * device.full_scale)
