@@ -169,11 +169,11 @@ def _searched(target: Target, count: int) -> list[tuple[float, Bools]]:
     found: list[tuple[float, Bools]] = []
     for index in order:
         found += neighbours(target, tops[index], sure.free, count)
-    best = max(value for value, _ in found)
+    top = max(value for value, _ in found)
     if len(found) < count:
         # What is sure gives way where nothing else is left to tell icons apart by.
         more = neighbours(target, tops[order[0]], np.ones(size, np.bool_), count)
-        found += [one for one in more if one[0] < best]
+        found += [one for one in more if one[0] < top]
     return found
 
 
