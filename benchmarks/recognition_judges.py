@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from recognition_sets import Drawn, content, laid
 
-__all__ = ["JUDGES", "Gallery"]
+__all__ = ["JUDGES", "RETRIEVAL", "Gallery"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -20,7 +20,8 @@ BLUR = 0.5
 STRETCHES = (1 / 1.1, 1.0, 1.1)
 SHIFTS = (-2.0, 0.0, 2.0)
 TRAINED = 24
-JUDGES = ("as placed", "aligned", "classifier")
+RETRIEVAL = ("as placed", "aligned")
+JUDGES = (*RETRIEVAL, "classifier")
 
 
 class Gallery:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from ..plain import html_words
-from .contact_sheet import figure_picture
 from .page_parts import FORM, SCRIPT, STYLE
 from .report import IconsReport
 from .set import Icon
+from .sprites import Sprites
 from .words import in_braille, in_words
 
 __all__ = ["icon_page"]
@@ -34,15 +31,17 @@ def _page(report: IconsReport) -> Iterator[str]:
     title = f"{len(report.icons)} icons on {html_words(report.device)}"
     yield '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>"
+    sprites = Sprites([icon.figure for icon in report.icons]) if report.icons else None
+    yield f"<title>{title}</title>\n<style>{STYLE}{sprites.style if sprites else ''}</style>\n</head>\n<body>"
     yield '<a class="skip" href="#icons">Skip to the icons</a>'
     yield f"<header><h1>{title}</h1>"
     yield f"<p>Mean similarity with the pictures: {report.similarity:.2f} of 1. In doubt: {report.doubted}. "
     yield f"Icons with another one nearer than {report.closer_than} dots: {report.neighbours}.</p></header>\n<main>"
     yield f'<h2 id="icons">Icons</h2>\n{FORM}\n<ul class="set">'
     places = {icon.name: place for place, icon in enumerate(report.icons)}
-    for group in _equal(report.icons):
-        yield "".join(_card(group, places))
+    if sprites:
+        for group in _equal(report.icons):
+            yield "".join(_card(group, places, sprites))
     yield "</ul>"
     yield from _close(report, places)
     if report.failed:
@@ -76,7 +75,7 @@ def _dots(distance: int) -> str:
     return "equal" if distance == 0 else "1 dot differs" if distance == 1 else f"{distance} dots differ"
 
 
-def _card(group: Sequence[Icon], places: dict[str, int]) -> Iterator[str]:
+def _card(group: Sequence[Icon], places: dict[str, int], sprites: Sprites) -> Iterator[str]:
     amplitude = group[0].pattern.amplitude
     words = html_words(in_words(amplitude))
     find = html_words(" ".join(f"{icon.name} {icon.label} {icon.category}" for icon in group).lower())
@@ -85,7 +84,7 @@ def _card(group: Sequence[Icon], places: dict[str, int]) -> Iterator[str]:
     yield f'<li data-find="{find}" data-doubt="{doubt}" data-least="{least:.3f}" data-count="{len(group)}">'
     yield f'<div class="row">{_drawn(amplitude, words)}<p class="braille">{in_braille(amplitude)}</p>'
     for icon in group:
-        yield f'<div class="one" id="icon-{places[icon.name]}"><img alt="" src="{_embedded(icon.figure)}"><div>'
+        yield f'<div class="one" id="icon-{places[icon.name]}">{sprites.drawn(places[icon.name])}<div>'
         yield f'<h3 dir="auto">{html_words(icon.name)}</h3>{_facts(icon, places)}</div></div>'
     yield f"</div><details><summary>Pattern in words</summary><p>{words}</p></details></li>"
 
@@ -103,12 +102,6 @@ def _facts(icon: Icon, places: dict[str, int]) -> str:
         facts.append(f"Nearest: {near}, {_dots(icon.distance)}.")
     doubt = f"<p><strong>Doubt:</strong> {html_words(icon.doubt)}</p>" if icon.doubt else ""
     return f'{doubt}<p class="muted">{" ".join(facts)}</p>'
-
-
-def _embedded(figure: NDArray[np.uint8]) -> str:
-    file = io.BytesIO()
-    Image.fromarray(figure_picture(figure)).save(file, "PNG")
-    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
 
 
 def _drawn(amplitude: NDArray[np.float64], words: str) -> str:

@@ -29,7 +29,7 @@ h2 { font-size: 1.25rem; } h3 { font-size: 1rem; margin: 0; overflow-wrap: anywh
 .row { display: flex; flex-wrap: wrap; gap: .75rem 1.5rem; align-items: center; }
 .row > svg, .row > .braille { flex: none; } .row > svg { width: 6rem; height: 6rem; }
 .one { display: flex; gap: .75rem; align-items: center; }
-.one img { width: 72px; height: 72px; object-fit: contain; image-rendering: pixelated; border-radius: .25rem; }
+.figure { flex: none; image-rendering: pixelated; border-radius: .25rem; print-color-adjust: exact; }
 .full, .half, .flat { stroke: currentColor; stroke-linecap: round; }
 .full { stroke-width: .8; } .half { stroke-width: .42; } .flat { stroke: var(--flat); stroke-width: .16; }
 .braille { font-size: 1.5rem; line-height: 1.15; margin: .5rem 0; white-space: pre; }

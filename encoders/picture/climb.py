@@ -22,13 +22,14 @@ GAIN = 1e-9
 SWEEPS = 40
 
 
-def climbed(target: Target, begins: Bools, ties: Floats) -> tuple[Bools, Floats]:
+def climbed(target: Target, begins: Bools, ties: Floats, free: Bools) -> tuple[Bools, Floats]:
     """The patterns reached by the best flip of one group until none helps, the best of them by flips of two as well.
 
     Parameters
     ----------
     begins : bool, shape (A, dots).
     ties : float64, shape (dots, groups), the dots that are flipped together.
+    free : bool, shape (dots,), those that may be flipped.
 
     Returns
     -------
@@ -37,21 +38,23 @@ def climbed(target: Target, begins: Bools, ties: Floats) -> tuple[Bools, Floats]
     small = [ties.T @ matrix @ ties for matrix in matrices(target.shape)]
     linear = [half[0] @ ties for half in target.linear]
     states = (begins @ ties) >= 0.5 * ties.sum(axis=0)
-    values = _by_single_flips(linear, small, states)
+    held = (~free @ ties) > 0
+    values = _by_single_flips(linear, small, states, held)
     best = int(values.argmax())
-    while _flipped_two(linear, small, states[best], float(values[best])):
-        values[best] = _by_single_flips(linear, small, states[best : best + 1])[0]
+    while _flipped_two(linear, small, states[best], float(values[best]), held):
+        values[best] = _by_single_flips(linear, small, states[best : best + 1], held)[0]
     done: Bools = (states @ ties.T) > 0.5
     return done, values
 
 
-def _by_single_flips(linear: Sequence[Floats], small: Sequence[Floats], states: Bools) -> Floats:
-    """Flip in place until nothing helps; the similarity reached."""
+def _by_single_flips(linear: Sequence[Floats], small: Sequence[Floats], states: Bools, held: Bools) -> Floats:
+    """Flip in place, what is not held, until nothing helps; the similarity reached."""
     values = np.zeros(len(states))
     live = np.arange(len(states))
     while len(live):
         now, flipped = _single_flips(linear, small, states[live])
         values[live] = now
+        flipped[:, held] = -np.inf
         best = flipped.argmax(axis=1)
         helps = flipped[np.arange(len(live)), best] > now + GAIN
         live, best = live[helps], best[helps]
@@ -72,9 +75,10 @@ def _single_flips(linear: Sequence[Floats], small: Sequence[Floats], states: Boo
     return now, flipped
 
 
-def _flipped_two(linear: Sequence[Floats], small: Sequence[Floats], state: Bools, value: float) -> bool:
+def _flipped_two(linear: Sequence[Floats], small: Sequence[Floats], state: Bools, value: float, held: Bools) -> bool:
     """Flip the best two in place when that helps; whether it did."""
     values = _double_flips(linear, small, state)
+    values[held] = values[:, held] = -np.inf
     flat = int(values.argmax())
     if values.flat[flat] <= value + GAIN:
         return False
@@ -97,7 +101,7 @@ def _double_flips(linear: Sequence[Floats], small: Sequence[Floats], state: Bool
     return total
 
 
-def neighbours(target: Target, dots: Bools, count: int) -> list[tuple[float, Bools]]:
+def neighbours(target: Target, dots: Bools, free: Bools, count: int) -> list[tuple[float, Bools]]:
     """A pattern and the most similar of those that differ from it in one or two dots, `count` in all at most."""
     linear, small = [half[0] for half in target.linear], matrices(target.shape)
     now, flipped = _single_flips(linear, small, dots[None])
@@ -106,6 +110,7 @@ def neighbours(target: Target, dots: Bools, count: int) -> list[tuple[float, Boo
         return found
     values = _double_flips(linear, small, dots)
     np.fill_diagonal(values, flipped[0])
+    values[~free] = values[:, ~free] = -np.inf
     values[np.tril_indices(len(dots), -1)] = -np.inf
     order = np.argsort(-values, axis=None, kind="stable")[: count - 1]
     order = order[np.isfinite(values.flat[order])]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .steps import content_box, otsu
 
-__all__ = ["doubt_of"]
+__all__ = ["doubt_of", "is_block"]
 
 Floats = NDArray[np.float32]
 Bools = NDArray[np.bool_]
@@ -71,8 +71,13 @@ def _is_line(dots: Bools) -> bool:
 
 
 def _is_full(dots: Bools) -> bool:
+    return is_block(dots) and min(np.ptp(np.argwhere(dots), axis=0)) > 0
+
+
+def is_block(dots: Bools) -> bool:
+    """Whether what is raised nearly fills a rectangle, be it one dot wide."""
     places = np.argwhere(dots)
     if not len(places):
         return False
     height, width = np.ptp(places, axis=0) + 1
-    return bool(min(height, width) > 1 and len(places) >= FULL_SHARE * height * width)
+    return bool(len(places) >= FULL_SHARE * height * width)

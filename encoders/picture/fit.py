@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..scene import GridShape
 from .climb import climbed, nearby, neighbours, swept
+from .held import dot_means, sure_dots, tied_dots
 from .options import Fit
 from .similarity import DENSE_DOTS, POINTS, Target, agreement, target_of
 from .steps import content_box, otsu
@@ -21,8 +21,6 @@ Bools = NDArray[np.bool_]
 
 CLIMBED = 3
 CUTS = (0.3, 0.45, 0.6, 0.75)
-# Icons that are nearly symmetric have their mark in what is not.
-SYMMETRIC = 0.99
 
 
 @dataclass(frozen=True)
@@ -117,17 +115,12 @@ def _around(middle: tuple[float, float], height: float, width: float) -> Window:
     return Window(middle[0] - height / 2, middle[0] + height / 2, middle[1] - width / 2, middle[1] + width / 2)
 
 
-def _mirrored(figure: Floats, axis: int) -> bool:
-    less = figure - figure.mean()
-    return float((less * np.flip(less, axis)).sum()) >= SYMMETRIC * float((less**2).sum())
-
-
 def best_patterns(figure: NDArray[np.float32], window: Window, shape: GridShape, count: int) -> Fitted:
     """Search the dots for the patterns most similar to a figure.
 
     The start is four thresholds of the mean over each dot, and Otsu's: what a plain box filter gives is among what
-    is tried. Each is improved by flips of one dot (mirror images together, where the figure is symmetric) until none
-    helps, the best of them by flips of two as well.
+    is tried. What `held` says is sure stays. Each is improved by flips of one dot, with those that go together, until
+    none helps, the best of them by flips of two as well.
 
     Parameters
     ----------
@@ -153,7 +146,7 @@ def best_patterns(figure: NDArray[np.float32], window: Window, shape: GridShape,
 
 def cut_starts(figure: Floats, shape: GridShape) -> Floats:
     """Patterns by thresholds of the mean of each dot; float64, shape (K, rows, cols)."""
-    means = figure.reshape(shape.rows, POINTS, shape.cols, POINTS).mean(axis=(1, 3))
+    means = dot_means(figure, shape)
     cuts = [*(cut * means.max() for cut in CUTS), otsu(means.astype(np.float32))[0]]
     starts: Floats = np.stack([means > cut for cut in cuts]).astype(np.float64)
     return starts
@@ -168,27 +161,20 @@ def _searched(target: Target, count: int) -> list[tuple[float, Bools]]:
     if size > DENSE_DOTS:
         best = int(agreement(target, starts)[0].argmax())
         return nearby(target, swept(target, starts[best]), count)
-    tops, values = climbed(target, starts.reshape(len(starts), -1) > 0.5, tied_dots(target.figure[0], shape))
+    ties = tied_dots(target.figure[0], shape)
+    sure = sure_dots(target.figure[0], shape).along(ties)
+    begins = ((starts.reshape(len(starts), -1) > 0.5) | sure.raised) & ~sure.flat
+    tops, values = climbed(target, begins, ties, sure.free)
     order = np.argsort(-values, kind="stable")[: 1 if count == 1 else CLIMBED]
     found: list[tuple[float, Bools]] = []
     for index in order:
-        found += neighbours(target, tops[index], count)
+        found += neighbours(target, tops[index], sure.free, count)
+    top = max(value for value, _ in found)
+    if len(found) < count:
+        # What is sure gives way where nothing else is left to tell icons apart by.
+        more = neighbours(target, tops[order[0]], np.ones(size, np.bool_), count)
+        found += [one for one in more if one[0] < top]
     return found
-
-
-def tied_dots(figure: Floats, shape: GridShape) -> Floats:
-    """Which dots go together: float64, shape (dots, groups), 1 where a dot is in a group."""
-    return _ties(shape, _mirrored(figure, 0), _mirrored(figure, 1))
-
-
-@lru_cache(maxsize=64)
-def _ties(shape: GridShape, down: bool, across: bool) -> Floats:
-    groups = np.arange(shape.rows * shape.cols).reshape(shape.rows, shape.cols)
-    for axis, symmetric in enumerate((down, across)):
-        if symmetric:
-            groups = np.minimum(groups, np.flip(groups, axis))
-    ties: Floats = (groups.reshape(-1, 1) == np.unique(groups)).astype(np.float64)
-    return ties
 
 
 def _frozen(dots: Bools) -> Bools:

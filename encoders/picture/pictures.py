@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 
 from ..braille.presentation import MIN_PART_S
 from ..scene import Frame, GridShape, PatternKind, Scene, TargetPattern
-from .doubt import doubt_of
+from .doubt import doubt_of, is_block
 from .errors import EmptyPicture
 from .figure import Step, figure_steps, spaced_steps, style_of
 from .fit import Candidate, Window, best_patterns, choose_window, plain_size, sampled
+from .held import dot_means
 from .limits import PictureLimits
 from .options import Fit, Invert, Output, PictureOptions, RegionsBy, Style
 from .reading import Picture, read_picture
 from .regions import TEXTURES, TexturedRegion, dot_regions, legend, textured
 from .sign import framed_sign
-from .similarity import POINTS, agreement, target_of
+from .similarity import agreement, target_of
 from .steps import background_light, composite, content_box, luminance
 from .views import views
 
@@ -33,7 +34,7 @@ __all__ = ["PICTURES_VERSION", "FrameReport", "PictureReport", "PictureScene", "
 
 Floats = NDArray[np.float64]
 
-PICTURES_VERSION = 2
+PICTURES_VERSION = 3
 """One more whenever a picture gives other patterns: what was kept of icons before is not used."""
 
 PIXELS_PER_ACTUATOR = 12
@@ -241,16 +242,21 @@ def _doubted(made: _Made, notes: tuple[str, ...], options: PictureOptions) -> Fr
 
 
 def _unframed(made: _Made, steps: list[Step], shape: GridShape, options: PictureOptions) -> _Made:
-    """The sign alone where the grid is too coarse to show anything of it inside its tile or ring."""
+    """The sign alone where the grid is too coarse to show its form inside its tile or ring, and it has one.
+
+    Where several patterns are asked for, what is shown of it is enough: choosing among them tells signs apart.
+    """
     framed = framed_sign(steps[-1].image)
     if framed is None:
         return made
     best = made.report.candidates[0]
-    inside = _dot_means(sampled(framed.inside.astype(np.float32), [best.window], shape)[0], shape) >= 0.5
-    if len(np.unique(best.dots[inside])) > 1:
+    inside = dot_means(sampled(framed.inside.astype(np.float32), [best.window], shape)[0], shape) >= 0.5
+    left = framed.left(best.dots, inside)
+    if left.any() and (options.candidates > 1 or not is_block(left)):
         return made
     steps = [*steps, Step("sign without its frame", framed.sign)]
-    return _viewed(steps, "overview", _window(steps, shape, options), shape, options)
+    alone = _viewed(steps, "overview", _window(steps, shape, options), shape, options)
+    return made if left.any() and is_block(alone.report.candidates[0].dots) else alone
 
 
 def _window(steps: list[Step], shape: GridShape, options: PictureOptions) -> Window:
@@ -282,7 +288,7 @@ def _levelled(
     """Tone to the nearest level, with the gain that is most similar; similarity is with the tone."""
     tone = _tone(steps)
     target = target_of(sampled(tone, [window], shape), shape)
-    means = _dot_means(target.figure[0], shape)
+    means = dot_means(target.figure[0], shape)
     levels = np.append(0.0, 10 ** (-options.level_step_db / 20 * np.arange(options.levels)))
     tries = np.stack([levels[np.abs(gain * means[..., None] - levels).argmin(axis=-1)] for gain in GAINS])
     scores = agreement(target, tries)[0]
@@ -305,7 +311,7 @@ def _textured(
     steps: list[Step], best: Candidate, shape: GridShape, options: PictureOptions
 ) -> tuple[TargetPattern, tuple[TexturedRegion, ...]]:
     colour = np.ascontiguousarray(np.moveaxis(steps[0].image, 2, 0))
-    means = np.stack([_dot_means(sampled(one, [best.window], shape)[0], shape) for one in colour], axis=-1)
+    means = np.stack([dot_means(sampled(one, [best.window], shape)[0], shape) for one in colour], axis=-1)
     labels = dot_regions(means, best.dots.astype(np.float64), options.regions, options.regions_by is RegionsBy.COLOUR)
     regions = []
     for index in range(int(labels.max()) + 1):
@@ -317,11 +323,6 @@ def _textured(
     waves = any(region.texture and region.texture.kind is PatternKind.SINE for region in regions)
     kind = PatternKind.SINE if waves else PatternKind.BARS
     return TargetPattern(_frozen(textured(labels)), kind, phase_matters=True), tuple(regions)
-
-
-def _dot_means(lattice: Floats, shape: GridShape) -> Floats:
-    means: Floats = lattice.reshape(shape.rows, POINTS, shape.cols, POINTS).mean(axis=(1, 3))
-    return means
 
 
 def _drawn(amplitude: NDArray[np.complex128]) -> NDArray[np.float32]:

@@ -25,14 +25,28 @@ class Framed:
     Attributes
     ----------
     sign : float32, shape (height, width), 0..1, without its tile or ring.
+    cut : whether it is cut out of a tile, not in a ring.
     inside : bool, the same shape: the box around the sign.
     """
 
-    def __init__(self, sign: Floats) -> None:
-        self.sign = sign
+    def __init__(self, sign: Floats, cut: bool) -> None:
+        self.sign, self.cut = sign, cut
         top, bottom, left, right = content_box(sign)
         self.inside = np.zeros(sign.shape, np.bool_)
         self.inside[top:bottom, left:right] = True
+
+    def left(self, dots: Bools, inside: Bools) -> Bools:
+        """What dots show of it, all bool, shape (rows, cols): none where it is one with the ring around it.
+
+        Parameters
+        ----------
+        inside : where its box is.
+        """
+        from scipy.ndimage import binary_dilation
+
+        seen: Bools = (dots != self.cut) & inside
+        around = binary_dilation(inside, np.ones((3, 3)))
+        return seen if self.cut or not dots[around].all() else np.zeros_like(seen)
 
 
 def framed_sign(figure: Floats) -> Framed | None:
@@ -53,11 +67,11 @@ def framed_sign(figure: Floats) -> Framed | None:
     filled = _filled(raised)
     if float(filled.mean()) < TILE_SHARE or max(float((filled ^ filled[::-1]).mean()), _lopsided(filled)) > LOPSIDED:
         return None
-    for mask, values in ((filled & ~raised, 1 - inner), (raised & ~_outer(raised), inner)):
+    for cut, mask, values in ((True, filled & ~raised, 1 - inner), (False, raised & ~_outer(raised), inner)):
         if SIGN_SHARES[0] <= float(mask.mean()) <= SIGN_SHARES[1] and _away_from_the_edge(mask):
             sign = np.zeros_like(figure)
             sign[top:bottom, left:right] = mask * values
-            return Framed(sign)
+            return Framed(sign, cut)
     return None
 
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 from encoders.picture.climb import climbed, neighbours, swept
 from encoders.picture.fit import Window, best_patterns, choose_window, sampled
+from encoders.picture.held import sure_dots, tied_dots
 from encoders.picture.options import Fit, PictureOptions, Style
 from encoders.picture.pictures import encode_picture, explain_picture
 from encoders.picture.similarity import DENSE_DOTS, agreement, matrices, pulls, squares, target_of
@@ -90,12 +91,21 @@ def all_patterns(shape: GridShape) -> np.ndarray:
     return bits.reshape(-1, shape.rows, shape.cols).astype(float)
 
 
+def with_sure(dots: np.ndarray, figure: np.ndarray, shape: GridShape) -> np.ndarray:
+    """Patterns in which what the figure decides is as it decides."""
+    sure = sure_dots(figure, shape).along(tied_dots(figure, shape))
+    kept = np.where(sure.free, dots.reshape(len(dots), -1), sure.raised).reshape(dots.shape)
+    return kept.astype(float)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_search_finds_the_best_of_all_patterns_of_a_small_grid(seed: int) -> None:
     chance = np.random.default_rng(seed)
     figure = np.kron(chance.random((5, 7)) > 0.5, np.ones((6, 6))).astype(np.float32)
     window = Window(0, 30, 0, 42)
-    best = float(agreement(target_of(sampled(figure, [window], TINY), TINY), all_patterns(TINY))[0].max())
+    windowed = sampled(figure, [window], TINY)
+    allowed = with_sure(all_patterns(TINY), windowed[0], TINY)
+    best = float(agreement(target_of(windowed, TINY), allowed)[0].max())
     found = best_patterns(figure, window, TINY, 1).candidates[0]
     assert found.similarity == pytest.approx(best, abs=0.02)
     assert found.similarity <= best + 1e-9
@@ -104,10 +114,10 @@ def test_the_search_finds_the_best_of_all_patterns_of_a_small_grid(seed: int) ->
 def test_no_flip_of_one_or_two_dots_helps_after_the_climb() -> None:
     figure = np.kron(np.random.default_rng(9).random((1, 8, 8)) > 0.6, np.ones((3, 3))).astype(float)
     target = target_of(figure, SIX)
-    (dots,), (reached,) = climbed(target, np.zeros((1, 36), bool), np.eye(36))
+    (dots,), (reached,) = climbed(target, np.zeros((1, 36), bool), np.eye(36), np.ones(36, bool))
     value = float(agreement(target, dots.reshape(1, 1, 6, 6).astype(float))[0, 0])
     assert value == pytest.approx(reached, abs=1e-9)
-    near = neighbours(target, dots, 667)
+    near = neighbours(target, dots, np.ones(36, bool), 667)
     assert len(near) == 1 + 36 + 36 * 35 // 2
     assert near[0][0] == pytest.approx(value, abs=1e-9)
     assert max(score for score, _ in near[1:]) <= value + 1e-9
@@ -170,7 +180,7 @@ def test_what_a_box_filter_gives_is_among_what_is_tried(path: Path) -> None:
     best = encode_picture(path, SIX, options).report.frames[0].candidates[0]
     windowed = sampled(figure_of(path, options), [best.window], SIX)
     means = windowed.reshape(6, 4, 6, 4).mean(axis=(1, 3))
-    boxes = np.stack([means > 0.5, means > otsu(means.astype(np.float32))[0]])
+    boxes = with_sure(np.stack([means > 0.5, means > otsu(means.astype(np.float32))[0]]), windowed[0], SIX)
     assert best.similarity >= agreement(target_of(windowed, SIX), boxes.astype(float)).max() - 1e-9
 
 
