@@ -1,4 +1,4 @@
-"""A plan into a file of any format: samples with their manifest, or a haptic file."""
+"""A plan into a file of any format: samples with their manifest, a pack, or a haptic file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from planner import Plan
 
-from .formats.table import format_of
+from .formats.table import PACK_SUFFIX, format_of
 from .formats.wav import Encoding
 from .waveform.file import write_waveform
 
@@ -23,8 +23,8 @@ class WrittenPlan:
 
     Attributes
     ----------
-    files : the samples and their manifest, or the haptic file.
-    peak_volts : largest voltage of any channel, None where no samples were written.
+    files : the samples and their manifest, the pack, or the haptic file.
+    peak_volts : largest voltage of any channel, None for a haptic file.
     """
 
     files: tuple[Path, ...]
@@ -57,6 +57,11 @@ def write_plan(
         When the ending of `path` stands for no format, or the file system refuses.
     """
     path = Path(path)
+    if path.suffix.lower() == PACK_SUFFIX:
+        from .packs.writer import write_pack
+
+        packed = write_pack(plan, path, progress=progress)
+        return WrittenPlan((path,), packed.peak_volts)
     if not format_of(path).sample_bytes:
         # Imported here: most files are samples.
         from .exchange.file import write_exchange

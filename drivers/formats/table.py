@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-__all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "SUFFIXES", "Format", "check_suffix", "format_of"]
+__all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "PACK_SUFFIX", "SUFFIXES", "Format", "check_suffix", "format_of"]
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,20 @@ FORMATS: Mapping[str, Format] = {
     ".raw": Format(
         "float32 of full scale, little-endian, channels interleaved, no header", ".raw", ".raw", {"float32": (4, 4)}
     ),
+    ".dwp": Format("a pack: events in place of samples, without a manifest beside it", "..packs.writer", "..packs.opened"),
     ".hjif": Format("levels, times and phases of the whole grid", "..exchange.hjif", "..exchange.hjif"),
     ".ahap": Format("levels and times of one actuator, or the mean", "..exchange.ahap", "..exchange.ahap"),
     ".haptic": Format("levels and times of one actuator, or the mean", "..exchange.haptic", "..exchange.haptic"),
 }  # fmt: skip
-"""Ending of a name -> its format: those of samples, then haptic files."""
+"""Ending of a name -> its format: those of samples, then packs and haptic files."""
 
 SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if form.sample_bytes)
 """Endings of samples."""
 
-EXCHANGE_SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if not form.sample_bytes)
+PACK_SUFFIX = ".dwp"
+"""Ending of packs (docs/pack.md)."""
+
+EXCHANGE_SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if not form.sample_bytes and suffix != PACK_SUFFIX)
 """Endings of haptic files."""
 
 

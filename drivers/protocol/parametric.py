@@ -20,7 +20,7 @@ from .outgoing import End, Message, UnfitController, check_fit, links_of, marks_
 from .pieces import NoPiece, pieces_of
 from .replies import Capabilities
 
-__all__ = ["ENVELOPES_SINCE", "NotParametric", "ParametricSession"]
+__all__ = ["ENVELOPES_SINCE", "NotParametric", "ParametricSession", "check_draws"]
 
 Floats = NDArray[np.float64]
 
@@ -77,8 +77,7 @@ class ParametricSession:
             Before anything, when the controller is not one for this waveform.
         """
         check_fit(self.manifest, found, parametric=True)
-        if found.version < ENVELOPES_SINCE:
-            raise UnfitController(f"controller {found.name!r}: it knows no envelopes; stream, or update the firmware")
+        check_draws(found)
         return self._messages(found, session)
 
     def _messages(self, found: Capabilities, session: int) -> Iterator[Message]:
@@ -86,6 +85,18 @@ class ParametricSession:
         yield StartMessage(session, True, self.manifest.rate_hz, self.manifest.samples)
         yield from sorted(events, key=lambda event: event.at)
         yield End(self.manifest.samples)
+
+
+def check_draws(found: Capabilities) -> None:
+    """Refuse a controller that draws no envelopes.
+
+    Raises
+    ------
+    UnfitController
+        With the cure.
+    """
+    if found.version < ENVELOPES_SINCE:
+        raise UnfitController(f"controller {found.name!r}: it knows no envelopes; stream, or update the firmware")
 
 
 @dataclass(frozen=True)

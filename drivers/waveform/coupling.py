@@ -38,10 +38,16 @@ class CouplingEvent:
 
 
 class CouplingWriter:
-    """Turns frames, in order, into the events that change something."""
+    """Turns frames, in order, into the events that change something.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
+    Parameters
+    ----------
+    sampled : for what changes links with samples only: a node between two of them is moved along the course to the
+        nearer one, so that only its corner is a little beside. A chain magnifies what is left of that.
+    """
+
+    def __init__(self, device: Device, *, sampled: bool = False) -> None:
+        self._device, self._sampled = device, sampled
         self._current: list[tuple[float, ...] | None] = [None] * device.rows
 
     def events(self, frame: FramePlan) -> list[CouplingEvent]:
@@ -52,7 +58,7 @@ class CouplingWriter:
         events: list[CouplingEvent] = []
         for row in range(self._device.rows):
             chains = slice(row * per_row, (row + 1) * per_row)
-            path = _RowPath.of(self._device, frame.states[chains], frame.ramps[chains])
+            path = _RowPath.of(self._device, frame.states[chains], frame.ramps[chains], self._sampled)
             events.extend(self._row_events(row, frame.start_s, path))
         return sorted(events, key=lambda event: (event.t_s, event.row))
 
@@ -85,18 +91,24 @@ class _RowPath:
     after: Floats
 
     @classmethod
-    def of(cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]) -> _RowPath:
+    def of(
+        cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None], sampled: bool
+    ) -> _RowPath:
         nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
         # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
         t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))
+        at_s = np.rint(t_s * device.amplifier.rate_hz) / device.amplifier.rate_hz if sampled else t_s
         before = np.zeros((len(t_s), device.cols - 1))
-        after = np.zeros_like(before)
+        after, along = np.zeros_like(before), np.zeros_like(before)
         n = device.chain_length
         for chain, (state, ramp) in enumerate(zip(states, ramps, strict=True)):
             links = slice(chain * n, chain * n + n - 1)
             before[:, links] = links_at(state, ramp, t_s, before=True)
             after[:, links] = links_at(state, ramp, t_s)
-        return cls(t_s, before, after)
+            along[:, links] = links_at(state, ramp, at_s)
+        smooth = np.all(before == after, axis=1)
+        before[smooth] = after[smooth] = along[smooth]
+        return cls(at_s, before, after)
 
 
 class LamTrack:
