@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from drivers import SUFFIXES
+from drivers import PACK_SUFFIX, SUFFIXES
 from encoders import Undefined
 
 from ..errors import AppError
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from ..request import Request
 
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Output", "Pareto", "Scheduler", "Tol",
-    "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder", "printable", "say",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Icon", "Json", "Language", "Output", "Pareto", "Scheduler",
+    "Tol", "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder", "printable",
+    "say",
 ]  # fmt: skip
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -40,10 +41,11 @@ Written = Annotated[
     str,
     typer.Argument(
         metavar="OUT",
-        help="A waveform written by `dotwave text` (.wav or .json).",
-        autocompletion=completed_files(*SUFFIXES, ".json"),
+        help="A waveform written by `dotwave text` (.wav or .json), or a pack (.dwp).",
+        autocompletion=completed_files(*SUFFIXES, PACK_SUFFIX, ".json"),
     ),
 ]
+Icon = Annotated[str | None, typer.Option(metavar="NAME", help="Which one of a pack (.dwp) that has several.")]
 Tol = Annotated[
     str | None,
     typer.Option(help="Largest error of full scale: draft, normal, fine or a number; says what it took."),

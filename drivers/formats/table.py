@@ -57,7 +57,7 @@ FORMATS: Mapping[str, Format] = {
     ".raw": Format(
         "float32 of full scale, little-endian, channels interleaved, no header", ".raw", ".raw", {"float32": (4, 4)}
     ),
-    ".dwp": Format("a pack: events in place of samples, without a manifest beside it", "..packs.writer", "..packs.opened"),
+    ".dwp": Format("a pack: events in place of samples, no manifest", "..packs.writer", "..packs.opened"),
     ".hjif": Format("levels, times and phases of the whole grid", "..exchange.hjif", "..exchange.hjif"),
     ".ahap": Format("levels and times of one actuator, or the mean", "..exchange.ahap", "..exchange.ahap"),
     ".haptic": Format("levels and times of one actuator, or the mean", "..exchange.haptic", "..exchange.haptic"),

@@ -17,7 +17,6 @@ from planner import DriveTone, FirstOrderHold, OperatingPoint, Ramp, tones_of
 from ..channels import channels_of
 from ..errors import LimitError
 from ..protocol.measured import turns_of
-from ..protocol.parametric import TOLERANCE
 from ..waveform.coupling import CouplingEvent, CouplingWriter
 from ..waveform.sampling import bias_on_ramp
 from ..waveform.timeline import PlacedFrame
@@ -25,6 +24,8 @@ from .curves import Curve, LinkCurve, TooLarge, cubics_of
 from .layout import LINKS
 
 __all__ = ["Course", "CurveShelf", "Part"]
+
+TOLERANCE = 1e-7  # of full volts; a chain of resonators makes some thousands of it
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -202,7 +202,7 @@ def _bent(values: Complexes, tol: float) -> Complexes | None:
 
 @lru_cache(maxsize=256)
 def _bernstein(samples: int) -> tuple[Floats, Floats]:
-    """The cubic Bernstein polynomials at samples of a piece, float64, shape (S, 4), and the inverse of least squares."""
+    """The cubic Bernstein polynomials at samples of a piece, float64, shape (S, 4), and their pseudo-inverse."""
     s = np.arange(samples) / samples
     basis: Floats = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
     return basis, np.linalg.pinv(basis)

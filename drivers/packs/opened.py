@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from chainsim import Device
+from pydantic import ValidationError
+
+from chainsim import Device, complaint_of
 
 from ..channels import channels_of
 from ..errors import UnreadableWaveform
@@ -78,6 +80,7 @@ class PackSession:
             yield from sorted(told, key=lambda event: max(event.at, first))
         yield End(self.manifest.samples)
 
+    @property
     def pieces(self) -> int:
         """How many envelopes are sent."""
         pack = self.samples.pack
@@ -139,7 +142,10 @@ def _frames(pack: Pack, entry: PackEntry, abouts: Any) -> Iterator[dict[str, Any
 
 
 def _channels(path: Path, pack: Pack) -> list[dict[str, Any]]:
-    return [channel.as_dict() for channel in channels_of(Device.model_validate(pack.device))]
+    try:
+        return [channel.as_dict() for channel in channels_of(Device.model_validate(pack.device))]
+    except ValidationError as error:
+        raise UnreadableWaveform(f"{path}: device: {complaint_of(error).sentence}") from None
 
 
 def _check_header(path: Path, pack: Pack, device: Device) -> None:

@@ -179,7 +179,7 @@ class Pack:
         )  # fmt: skip
 
     def pattern(self, entry: PackEntry) -> Floats:
-        """What is to be felt of its first frame: float64, shape (rows, cols), full scale; NaN where anything will do."""
+        """What is to be felt of its first frame; float64, shape (rows, cols), of full scale, NaN where any will do."""
         shape = self.header.rows, self.header.cols
         percent = self._view.array("u1", shape[0] * shape[1], entry.pattern_at).reshape(shape)
         return np.where(percent == ANY, np.nan, percent / 100)

@@ -68,6 +68,11 @@ class ParametricSession:
                 found += one.draw(stretch, np.ascontiguousarray(volts[:, one.channel.index]))
         return cls(manifest, tuple(sorted(found, key=lambda envelope: envelope.at)))
 
+    @property
+    def pieces(self) -> int:
+        """How many envelopes are sent."""
+        return len(self.envelopes)
+
     def messages(self, found: Capabilities, *, session: int) -> Iterator[Message]:
         """START, the events by time, END.
 
