@@ -76,10 +76,11 @@ class Curve:
         """
         turns, count = view.unpack(CURVE_HEAD, at)
         pieces = view.array(curve_type(turns), count, at + CURVE_HEAD.size)
-        parts = pieces["points"].astype(np.float64)
-        points = parts[:, :, 0] + (1j * parts[:, :, 1] if turns else 0j)
+        with np.errstate(invalid="ignore"):  # what is no number is refused below
+            parts = pieces["points"].astype(np.float64)
+            points = parts[:, :, 0] + (1j * parts[:, :, 1] if turns else 0j)
+            within = np.all(np.abs(points) <= full_volts)
         found = cls(turns, pieces["at"].astype(np.int64), pieces["ramp"].astype(np.int64), points)
-        within = np.all(np.abs(points) <= full_volts)  # no number is not
         ordered = count and found.at[0] == 0 and np.all(np.diff(found.at) > 0)
         if not (within and ordered and np.all(found.ramp <= LONGEST_PIECE)):
             view.damaged(at)
@@ -140,8 +141,10 @@ class LinkCurve:
         """From a file; raises as `Curve.read`."""
         _, count = view.unpack(CURVE_HEAD, at)
         pieces = view.array(links_type(links), count, at + CURVE_HEAD.size)
-        found = cls(pieces["at"].astype(np.int64), pieces["ramp"].astype(np.int64), pieces["lam"].astype(np.float64))
-        within = np.all((found.lam >= 0) & (found.lam <= lam_max * (1 + 1e-6)))
+        with np.errstate(invalid="ignore"):
+            lam = pieces["lam"].astype(np.float64)
+            within = np.all((lam >= 0) & (lam <= lam_max * (1 + 1e-6)))
+        found = cls(pieces["at"].astype(np.int64), pieces["ramp"].astype(np.int64), lam)
         if not (within and np.all(np.diff(found.at) >= 0)):
             view.damaged(at)
         return found

@@ -91,6 +91,7 @@ class Header:
         header = cls(*rest)
         (seal,) = cls._seal.unpack_from(view.data, cls._struct.size)
         grid = header.rows and header.cols and header.channels and header.channels % header.rows == 0
+        grid = grid and header.rate_hz and 0 < header.full_volts < np.inf
         if seal != zlib.crc32(view.bytes(0, cls._struct.size)) or header.length != len(view.data) or not grid:
             raise UnreadableWaveform(f"{view.path}: the pack is damaged or not whole; copy or write it again")
         return header
