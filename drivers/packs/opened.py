@@ -14,10 +14,10 @@ from chainsim import Device, complaint_of
 from ..channels import channels_of
 from ..errors import UnreadableWaveform
 from ..protocol.envelope import Envelope
-from ..protocol.messages import StartMessage
-from ..protocol.outgoing import End, Message, check_fit, link_coupling, marks_of
+from ..protocol.outgoing import End, Message, check_fit, link_coupling, marks_of, start_of
 from ..protocol.parametric import check_draws
 from ..protocol.playout import Event
+from ..protocol.record import scene_note
 from ..protocol.replies import Capabilities
 from ..waveform.coupling import CouplingEvent
 from ..waveform.manifest import SCHEMA, Manifest, digest_of
@@ -72,7 +72,7 @@ class PackSession:
         return self._messages(found, session)
 
     def _messages(self, found: Capabilities, session: int) -> Iterator[Message]:
-        yield StartMessage(session, True, self.manifest.rate_hz, self.manifest.samples)
+        yield start_of(session, found, self.manifest.samples, scene_note(self.manifest), parametric=True)
         marks = marks_of(self.manifest, found)
         for first, settled, events in _events(self.samples.pack, self.samples.entry):
             told: list[Event] = [next(marks)] if settled != NO_PATTERN else []

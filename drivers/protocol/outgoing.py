@@ -138,17 +138,20 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
     yield End(first)
 
 
-def start_of(session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0) -> StartMessage:
+def start_of(
+    session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0, *, parametric: bool = False
+) -> StartMessage:
     """START, its note where there is room for it.
 
     Parameters
     ----------
     total : samples; 0 is open.
     prefill_s : seconds in store that are enough to begin, where the controller knows of that; 0: half of its buffer.
+    parametric : no samples follow.
     """
     prefill = max(1, round(prefill_s * found.rate_hz)) if prefill_s and found.version >= OPEN_SINCE else 0
     fixed = START_FIXED + (PREFILL_FIXED if prefill else 0)
-    return StartMessage(session, False, found.rate_hz, total, fitting(note, found, fixed), prefill)
+    return StartMessage(session, parametric, found.rate_hz, total, fitting(note, found, fixed), prefill)
 
 
 def block_of(found: Capabilities) -> int:

@@ -15,9 +15,9 @@ from ..formats.samples import SampleReader
 from ..waveform.manifest import FrameMark, Manifest
 from .envelope import Envelope
 from .measured import turns_of
-from .messages import StartMessage
-from .outgoing import End, Message, UnfitController, check_fit, links_of, marks_of
+from .outgoing import End, Message, UnfitController, check_fit, links_of, marks_of, start_of
 from .pieces import NoPiece, pieces_of
+from .record import scene_note
 from .replies import Capabilities
 
 __all__ = ["ENVELOPES_SINCE", "NotParametric", "ParametricSession", "check_draws"]
@@ -87,7 +87,7 @@ class ParametricSession:
 
     def _messages(self, found: Capabilities, session: int) -> Iterator[Message]:
         events = [*links_of(self.manifest, found), *self.envelopes, *marks_of(self.manifest, found)]
-        yield StartMessage(session, True, self.manifest.rate_hz, self.manifest.samples)
+        yield start_of(session, found, self.manifest.samples, scene_note(self.manifest), parametric=True)
         yield from sorted(events, key=lambda event: event.at)
         yield End(self.manifest.samples)
 
