@@ -1,9 +1,9 @@
 /* A board that is a pseudo-terminal: in real time by the monotonic clock, in one thread, so that nothing needs a lock.
  *
- *     controller [--link PATH] [--record FILE] [--pack FILE --icon NAME]
+ *     controller [--link PATH] [--record FILE] [--output FILE] [--pack FILE --icon NAME]
  *
  * prints the name of its port. PATH becomes a symbolic link to it; the record gets what goes out while
- * a session plays (vectors.h). Ends on SIGTERM and SIGINT. With a pack there is no line: it plays one icon of it as
+ * a session plays (vectors.h), the output the codes of every sample, i16 each, also while nothing plays. Ends on SIGTERM and SIGINT. With a pack there is no line: it plays one icon of it as
  * quickly as the machine can, and ends.
  */
 #define _XOPEN_SOURCE 700
@@ -32,7 +32,7 @@
 
 static volatile sig_atomic_t ended;
 static int line;
-static FILE *record;
+static FILE *record, *output;
 static uint8_t coming[BYTES_READ], pending[BYTES_PENDING];
 static uint32_t coming_at, coming_length, pending_length;
 static uint64_t now_us, samples_out;
@@ -62,6 +62,7 @@ void board_links(uint32_t row, const uint16_t *codes)
 void board_write(const int16_t *codes)
 {
     uint8_t bytes[VECTOR_BYTES];
+    if (output && fwrite(codes, sizeof *codes, DW_CHANNELS, output) != DW_CHANNELS) ended = 1;
     if (record && vector_put(bytes, codes) && fwrite(bytes, 1, sizeof bytes, record) != sizeof bytes) ended = 1;
 }
 
@@ -152,8 +153,8 @@ static int run(const char *link)
 
 int main(int argc, char **argv)
 {
-    static const char *const names[] = {"--link", "--record", "--pack", "--icon"};
-    const char *given[4] = {0, 0, 0, 0};
+    static const char *const names[] = {"--link", "--record", "--output", "--pack", "--icon"};
+    const char *given[5] = {0, 0, 0, 0, 0};
     struct sigaction action;
     int done;
     memset(&action, 0, sizeof action);
@@ -162,17 +163,22 @@ int main(int argc, char **argv)
     sigaction(SIGINT, &action, 0);
     for (int i = 1; i < argc; i += 2) {
         int k = 0;
-        while (k < 4 && strcmp(argv[i], names[k]) != 0) k++;
-        if (k == 4 || i + 1 == argc) {
-            fprintf(stderr, "%s: %s: expected --link PATH, --record FILE, or --pack FILE --icon NAME\n", argv[0], argv[i]);
+        while (k < 5 && strcmp(argv[i], names[k]) != 0) k++;
+        if (k == 5 || i + 1 == argc) {
+            fprintf(stderr, "%s: %s: expected --link PATH, --record FILE, --output FILE, or --pack FILE --icon NAME\n",
+                    argv[0], argv[i]);
             return 2;
         }
         given[k] = argv[i + 1];
     }
-    if (given[1] && !(record = fopen(given[1], "wb"))) done = 0;
-    else if (given[2]) return !play_pack(given[2], given[3] ? given[3] : "", sample) || (record && fclose(record) != 0);
-    else done = run(given[0]);
+    done = (!given[1] || (record = fopen(given[1], "wb"))) && (!given[2] || (output = fopen(given[2], "wb")));
+    if (done && given[3]) {
+        if (!play_pack(given[3], given[4] ? given[4] : "", sample)) return 1;
+    } else if (done) {
+        done = run(given[0]);
+    }
     if (record && fclose(record) != 0) done = 0;
+    if (output && fclose(output) != 0) done = 0;
     if (done) return 0;
     fprintf(stderr, "%s: %s\n", argv[0], strerror(errno));
     return 1;
