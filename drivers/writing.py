@@ -25,10 +25,12 @@ class WrittenPlan:
     ----------
     files : the samples and their manifest, the pack, or the haptic file.
     peak_volts : largest voltage of any channel, None for a haptic file.
+    left_out : one sentence on what of the plan is not in a pack, empty where all is.
     """
 
     files: tuple[Path, ...]
     peak_volts: float | None
+    left_out: str = ""
 
 
 def write_plan(
@@ -61,7 +63,7 @@ def write_plan(
         from .packs.writer import write_pack
 
         packed = write_pack(plan, path, progress=progress)
-        return WrittenPlan((path,), packed.peak_volts)
+        return WrittenPlan((path,), packed.peak_volts, packed.left_out)
     if not format_of(path).sample_bytes:
         # Imported here: most files are samples.
         from .exchange.file import write_exchange

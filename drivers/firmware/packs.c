@@ -1,12 +1,14 @@
 #include "packs.h"
 
+#include <string.h>
+
 #include "board.h"
 #include "playout.h"
 #include "session.h"
 
 /* What can sound or move at a time: see DW_VOICES; a row's links are one more. */
 #define PARTS_MOST (DW_VOICES + DW_ROWS)
-#define LINKS_SIZE (14u + 2u * DW_LINKS)
+#define LINKS_SIZE (14u + 4u * DW_LINKS)
 #define ENVELOPE_SIZE 54u
 
 /* A part of the present frame, and how far it is. */
@@ -75,18 +77,6 @@ static cursor *earliest(void)
     return first;
 }
 
-/* 0 for what is no lam of this pack. */
-static int put_links(uint8_t *p, const cursor *c)
-{
-    for (uint32_t i = 0; i < DW_LINKS; i++) {
-        float lam = dw_f32(c->next + 8u + 4u * i);
-        if (!(lam >= 0.0f && lam <= DW_LAM_MAX * 1.000001f)) return 0;
-        lam = lam / DW_LAM_STEP + 0.5f;
-        dw_put16(p + 14u + 2u * i, (uint16_t)(lam < 65535.0f ? lam : 65535.0f));
-    }
-    return 1;
-}
-
 /* The length of the payload. */
 static uint32_t put_points(uint8_t *p, const cursor *c)
 {
@@ -108,14 +98,14 @@ static int tell(cursor *c)
     dw_put16(p + 8, c->index);
     dw_put32(p + 10, dw_u32(c->next + 4));
     if (c->links) {
-        if (!put_links(p, c)) return refused();
+        memcpy(p + 14, c->next + 8, 4u * DW_LINKS);
     } else {
         dw_put64(p + 14, c->turns);
         length = put_points(p + 22, c);
     }
     c->next += c->size;
     c->left--;
-    return carried_out(c->links ? DW_COUPLING : DW_ENVELOPE, p, length);
+    return carried_out(c->links ? DW_LINKS_TO : DW_ENVELOPE, p, length);
 }
 
 static uint64_t samples_of(const dw_pack *of, const dw_pack_entry *in)

@@ -174,9 +174,11 @@ class Course:
 
         def samples() -> tuple[Complexes, complex | None]:
             rising = tone.on_ramp(since_s, hold, device.tau_per_s)
-            values = np.zeros(len(since_s), complex) if rising is None else np.asarray(rising, complex)
+            values = np.zeros(len(since_s), np.complex128)
+            if rising is not None:
+                values += rising / device.epsilon_per_volt
             held = hold.gain * tone.held / device.epsilon_per_volt
-            return values / device.epsilon_per_volt, self._held(placed, since_s, held)
+            return values, self._held(placed, since_s, held)
 
         return _Made(_key(since_s, tone.t_s, tone.values, tone.slopes, tone.held, placed), samples)
 

@@ -78,7 +78,7 @@ class Curve:
         pieces = view.array(curve_type(turns), count, at + CURVE_HEAD.size)
         with np.errstate(invalid="ignore"):  # what is no number is refused below
             parts = pieces["points"].astype(np.float64)
-            points = parts[:, :, 0] + (1j * parts[:, :, 1] if turns else 0j)
+            points = (parts[:, :, 0] + (1j * parts[:, :, 1] if turns else 0j)).astype(np.complex128)
             within = np.all(np.abs(points) <= full_volts)
         found = cls(turns, pieces["at"].astype(np.int64), pieces["ramp"].astype(np.int64), points)
         ordered = count and found.at[0] == 0 and np.all(np.diff(found.at) > 0)
@@ -208,4 +208,4 @@ def _bernstein(samples: int) -> tuple[Floats, Floats]:
     """The cubic Bernstein polynomials at samples of a piece, float64, shape (S, 4), and their pseudo-inverse."""
     s = np.arange(samples) / samples
     basis: Floats = np.stack([(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3], axis=1)
-    return basis, np.linalg.pinv(basis)
+    return basis, np.asarray(np.linalg.pinv(basis), dtype=np.float64)

@@ -38,6 +38,7 @@ __all__ = ["PackWriter", "PackedEntry", "write_pack"]
 MOVING, PHASES = 1, 2
 # What a way says for each row, and what the places of frames say.
 IN_WAYS = ("start_s", "settled_s", "end_s", "moving", "omega", "target", "wish", "tones", "phase")
+LEFT_OUT = "The steps of the converter are not in the pack: a controller rounds to its own."
 DEFAULTS: Mapping[str, Any] = {"cells": "", "text": "", "outcome": "ok", "page": 0, "span": [0, 0]}
 
 
@@ -49,11 +50,13 @@ class PackedEntry:
     ----------
     frames : that show something.
     peak_volts : largest of any channel.
+    left_out : one sentence on what is not in it, empty where all is.
     """
 
     frames: int
     samples: int
     peak_volts: float
+    left_out: str = ""
 
 
 class PackWriter:
@@ -124,7 +127,8 @@ class PackWriter:
         about = packed_about({"encoding": dict(plan.encoding), "frames": abouts, "headings": headings})
         count = len(frames) // (FRAME_HEAD.size + 4 * self._device.rows)
         self._enter(title, spoken.encode("utf-8", "replace"), code_point, (bytes(frames), count), pattern, about)
-        return PackedEntry(len(abouts), samples, course.peak_volts)
+        steps = LEFT_OUT if self._device.amplifier.volt_step else ""
+        return PackedEntry(len(abouts), samples, course.peak_volts, steps)
 
     def write(self, file: BinaryIO, path: Path) -> None:
         """Write all that was taken to an open and empty file.

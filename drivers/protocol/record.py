@@ -20,7 +20,7 @@ from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
 from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
-from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
+from .messages import FULL_CODE, Codes, LinkCoupling, Links, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
 __all__ = ["ArrivalRecorder", "CutShort", "device_note", "frame_note", "live_note", "plan_note", "scene_note"]
@@ -159,8 +159,11 @@ class ArrivalRecorder:
     def event(self, event: Event) -> None:
         """Something to do at a sample."""
         rate = self._device.amplifier.rate_hz
-        if isinstance(event, LinkCoupling):
-            lam = [code * self._lam_step for code in event.codes]
+        if isinstance(event, LinkCoupling | Links):
+            if isinstance(event, LinkCoupling):
+                lam = [code * self._lam_step for code in event.codes]
+            else:
+                lam = list(event.lam)
             times = {"t_s": event.at / rate, "ramp_s": event.ramp / rate}
             self._coupling.append({"row": event.row, "lam": lam, **times})
         elif isinstance(event, Mark) and (frame := _unpacked(event.note)):

@@ -18,7 +18,7 @@ from .early import EarlyPackets
 from .envelope import LONGEST_PIECE, Envelope
 from .keys import KeyEvent, KeyWaiting
 from .measured import Measure, parts_of
-from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
+from .messages import VERSION, Bias, Codes, LinkCoupling, Links, Mark, SamplesMessage, StartMessage, Tones
 from .metering import Meter, Senses
 from .packet import MAX_PAYLOAD, ORDERED, Kind, Packet, PacketReader, encode
 from .playout import ControllerSpec, Event, OutputBlock, Playout
@@ -271,6 +271,10 @@ class VirtualController:
             fits = event.row < spec.rows and len(event.codes) == spec.cols - 1
             if not fits or max(event.codes, default=0) * spec.lam_step > spec.lam_max * (1 + 1e-6):
                 raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most lam_max")
+        elif isinstance(event, Links):
+            fits = event.row < spec.rows and len(event.lam) == spec.cols - 1
+            if not fits or not all(0 <= lam <= spec.lam_max * (1 + 1e-6) for lam in event.lam):
+                raise _Refusal(f"links: rows 0..{spec.rows - 1}, {spec.cols - 1} links of 0 to lam_max")
         elif isinstance(event, Envelope):
             if event.channel >= spec.channels or not event.fits(spec.full_volts):
                 pieces = f"1 point or 4 over 1 to {LONGEST_PIECE} samples"
@@ -323,6 +327,7 @@ class VirtualController:
 def _event(packet: Packet) -> Event:
     kinds: dict[Kind, type[Event]] = {
         Kind.COUPLING: LinkCoupling,
+        Kind.LINKS: Links,
         Kind.BIAS: Bias,
         Kind.TONES: Tones,
         Kind.MARK: Mark,

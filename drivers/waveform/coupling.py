@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chainsim import Device
 from planner import FramePlan, OperatingPoint, Ramp, links_at
 
-__all__ = ["CouplingEvent", "CouplingWriter", "LamTrack"]
+__all__ = ["CouplingEvent", "CouplingWriter", "LamTrack", "on_samples"]
 
 Floats = NDArray[np.float64]
 
@@ -109,6 +109,28 @@ class _RowPath:
         smooth = np.all(before == after, axis=1)
         before[smooth] = after[smooth] = along[smooth]
         return cls(at_s, before, after)
+
+
+def on_samples(events: Iterable[CouplingEvent], rate_hz: int, rows: int, cols: int) -> Iterator[CouplingEvent]:
+    """Events at samples, row by row, that keep to the same course: only its corners are a little beside.
+
+    A ramp that ends between two samples ends at the nearer one, where the course is then; before a jump, at its height.
+    """
+    of_row: list[list[CouplingEvent]] = [[] for _ in range(rows)]
+    for event in events:
+        of_row[event.row].append(event)
+    for row in of_row:
+        if not row:
+            continue
+        end_s = np.array([event.t_s + event.ramp_s for event in row])
+        near_s = np.rint(end_s * rate_hz) / rate_hz
+        along = _RowTrack.of(row, cols).at(near_s)
+        after = [(event.t_s, event.ramp_s) for event in row[1:]] + [(np.inf, 0.0)]
+        for k, (event, (next_s, ramp_s)) in enumerate(zip(row, after, strict=True)):
+            goes_on = event.ramp_s > 0 and (ramp_s > 0 or next_s > near_s[k])
+            at_s = round(event.t_s * rate_hz) / rate_hz
+            lam = tuple(along[k].tolist()) if goes_on else event.lam
+            yield CouplingEvent(at_s, event.row, lam, max(0.0, float(near_s[k]) - at_s))
 
 
 class LamTrack:

@@ -34,7 +34,7 @@ from drivers import (
     session_messages,
     write_waveform,
 )
-from drivers.protocol.messages import VERSION, LinkCoupling, Mark, SamplesMessage
+from drivers.protocol.messages import VERSION, Links, Mark, SamplesMessage
 from drivers.protocol.outgoing import Message
 from drivers.protocol.plant import Sensors, TruePlant
 from drivers.protocol.playout import Event
@@ -196,7 +196,7 @@ def test_marks_measures_and_links_are_those_of_the_file(tmp_path: Path, device: 
     assert led_notes == notes
     assert len(notes) == 3
     assert all(notes)
-    assert any(isinstance(event, LinkCoupling) for event in plain)
+    assert any(isinstance(event, Links) for event in plain)
 
 
 def told(sent: Iterator[Message]) -> tuple[list[Event], list[dict[str, Any]]]:

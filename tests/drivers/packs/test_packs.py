@@ -29,7 +29,7 @@ from drivers.packs.layout import Header
 from drivers.packs.opened import PackSession
 from drivers.packs.sounding import PackSamples
 from drivers.protocol.envelope import Envelope
-from drivers.protocol.messages import LinkCoupling, Mark, StartMessage
+from drivers.protocol.messages import Links, Mark, StartMessage
 from drivers.protocol.outgoing import End
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import Plan, plan_scene
@@ -131,7 +131,7 @@ def test_a_session_of_a_pack_goes_by_time_and_draws_what_the_pack_does(texts: di
     assert [event.at for event in events] == sorted(event.at for event in events)
     assert sum(isinstance(event, Mark) for event in events) == len(manifest.frames)
     assert sum(isinstance(event, Envelope) for event in events) == session.pieces
-    assert sum(isinstance(event, LinkCoupling) for event in events) == len(manifest.coupling)
+    assert sum(isinstance(event, Links) for event in events) == len(manifest.coupling)
 
 
 def test_a_name_is_found_by_few_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
