@@ -15,6 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from encoders import TargetPattern
+
 from ..errors import DriverError, UnreadableWaveform
 from ..files.whole import check_plain, naming
 from .curves import Curve, LinkCurve
@@ -183,6 +185,13 @@ class Pack:
         shape = self.header.rows, self.header.cols
         percent = self._view.array("u1", shape[0] * shape[1], entry.pattern_at).reshape(shape)
         return np.where(percent == ANY, np.nan, percent / 100)
+
+    def target(self, name: str) -> TargetPattern:
+        """The pattern of an entry as what a scene, or `dotwave.Live`, shows; raises as `find`."""
+        level = self.pattern(self.find(name))
+        known = ~np.isnan(level)
+        weight = None if known.all() else known.astype(np.float64)
+        return TargetPattern(np.nan_to_num(level).astype(np.complex128), weight=weight)
 
     def frames(self, entry: PackEntry) -> NDArray[Any]:
         """Its frames: a record each of settled, samples and ways."""

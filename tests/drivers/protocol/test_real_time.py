@@ -36,7 +36,7 @@ BESIDE = round(0.05 * RATE_HZ)
 @contextmanager
 def controller(*words: str | Path) -> Iterator[str]:
     """The port of the firmware, while it runs."""
-    command = [built("posix", PAPER.name), *words]
+    command = [str(built("posix", PAPER.name)), *map(str, words)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as program:
         assert program.stdout is not None
         try:
@@ -47,7 +47,7 @@ def controller(*words: str | Path) -> Iterator[str]:
 
 
 def host(path: Path, port: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "dotwave", "play", path, "--port", port, "--live", "--json"]
+    command = [sys.executable, "-m", "dotwave", "play", str(path), "--port", port, "--live", "--json"]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
