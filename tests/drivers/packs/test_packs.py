@@ -6,13 +6,14 @@ import random
 import struct
 import zlib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import dotwave as dw
-from chainsim import load_device
+from chainsim import Device, load_device
 from drivers import (
     DriverError,
     FileError,
@@ -49,9 +50,14 @@ def texts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {device: folder / f"{device}.dwp" for device in DEVICES}
 
 
+@cache
+def profile(device: str) -> Device:
+    return load_device(device)
+
+
 def icon_plan(device: str, dots: np.ndarray) -> Plan:
     frame = Frame(TargetPattern(dots.astype(complex)), dwell_s=1.0)
-    return plan_scene(Scene(GridShape(6, 6), (frame,), {"kind": "icon"}), load_device(device))
+    return plan_scene(Scene(GridShape(6, 6), (frame,), {"kind": "icon"}), profile(device))
 
 
 def icons(device: str, count: int, path: Path, seed: int = 1) -> Path:

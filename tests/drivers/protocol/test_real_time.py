@@ -127,17 +127,18 @@ def test_a_host_that_is_killed_leaves_zero_within_the_watchdog_time(tmp_path: Pa
 
     with controller("--output", output) as port:
         playing = host(tmp_path / "hello.wav", port)
-        # One more than three seconds, so that it stands.
-        wait_for(lambda: int(codes().any(axis=1).sum()) > 3 * RATE_HZ)
+        # More than three seconds of it, so that it stands; and now, for a machine that is busy lets it run dry.
+        wait_for(lambda: int(codes().any(axis=1).sum()) > 3 * RATE_HZ and bool(codes()[-1].any()))
+        alive = len(codes())
         playing.kill()
         playing.communicate()
         known = len(codes())
         wait_for(lambda: len(codes()) > known + 2 * RATE_HZ)
     out = np.abs(codes()).max(axis=1)
-    assert out[known - RATE_HZ : known].all()
     assert not out[known + WATCHDOG + BESIDE :].any()
     # It went there by a ramp.
     zero = int(np.flatnonzero(out)[-1]) + 1
+    assert zero >= alive
     ramp = out[zero - RAMP : zero].astype(int)
     assert (np.diff(ramp) <= 0).all()
-    assert ramp[0] >= 0.95 * out[known - RATE_HZ]
+    assert ramp[0] >= 0.95 * out.max()
