@@ -18,7 +18,8 @@ __all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "PACK_SUFFIX", "SUFFIXES", "Format", 
 class Format:
     """What is known of a format without importing its module.
 
-    A module of samples has ``open_writer(file, channels, rate_hz, encoding)``, which gives a `SampleWriter`, and
+    That which reads packs has ``read_packed(path, name)``, the manifest and `SampleReader` of an entry. A module of
+    samples has ``open_writer(file, channels, rate_hz, encoding)``, which gives a `SampleWriter`, and
     ``open_reader(path, channels, rate_hz)``, which gives a `SampleReader`. One of a haptic file, which carries no
     samples and has no manifest beside it, has ``content_of(plan, actuator)``, the content as plain JSON types, and
     ``curves_of(content)``, the `HapticCurves` of a content that keeps the rules of the format.

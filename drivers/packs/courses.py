@@ -23,7 +23,7 @@ from ..waveform.timeline import PlacedFrame
 from .curves import Curve, LinkCurve, TooLarge, cubics_of
 from .layout import LINKS
 
-__all__ = ["Course", "CurveShelf", "Part"]
+__all__ = ["CurveShelf", "PackCourse", "RowPart"]
 
 TOLERANCE = 1e-7  # of full volts; a chain of resonators makes some thousands of it
 
@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
-class Part(NamedTuple):
+class RowPart(NamedTuple):
     """What one place of a row does: `place` is a channel of it, or LINKS; `at` is where the curve stands."""
 
     place: int
@@ -89,7 +89,7 @@ class CurveShelf:
         return self.keep(LinkCurve(at - placed.first, end - at, lam).packed())
 
 
-class Course:
+class PackCourse:
     """What a session does, frame after frame; each part is told only where something changes.
 
     Attributes
@@ -104,7 +104,7 @@ class Course:
         self._standing: dict[tuple[int, int], complex] = {}
         self.peak_volts = 0.0
 
-    def parts(self, placed: PlacedFrame) -> list[list[Part]]:
+    def parts(self, placed: PlacedFrame) -> list[list[RowPart]]:
         """The parts of every row in the next frame, by place.
 
         Raises
@@ -112,20 +112,20 @@ class Course:
         LimitError
             When more is wanted than the amplifier's volts.
         """
-        rows: list[list[Part]] = [[] for _ in range(self._device.rows)]
+        rows: list[list[RowPart]] = [[] for _ in range(self._device.rows)]
         per_row = self._device.chains_per_row
         for chain, (state, ramp) in enumerate(zip(placed.plan.states, placed.plan.ramps, strict=True)):
             row, number = divmod(chain, per_row)
             n = self._device.chain_length
             drives = self._drives(placed, state, ramp)
-            rows[row] += (Part(number, at) for at in self._told(chain, placed, drives))
+            rows[row] += (RowPart(number, at) for at in self._told(chain, placed, drives))
             for actuator in range(n if self._device.bias == "actuator" else 0):
                 col = number * n + actuator
                 channel = self._device.rows * per_row + row * self._device.cols + col
                 bias = [(0, self._bias(placed, state, ramp, actuator))]
-                rows[row] += (Part(per_row + col, at) for at in self._told(channel, placed, bias))
+                rows[row] += (RowPart(per_row + col, at) for at in self._told(channel, placed, bias))
         for row, at in self._linked(placed):
-            rows[row].append(Part(LINKS, at))
+            rows[row].append(RowPart(LINKS, at))
         return [sorted(row) for row in rows]
 
     def _told(

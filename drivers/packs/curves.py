@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..protocol.envelope import LONGEST_PIECE
-from .layout import View, curve_type, links_type
+from .layout import PackView, curve_type, links_type
 
 __all__ = ["CURVE_HEAD", "Curve", "LinkCurve", "TooLarge", "cubics_of"]
 
@@ -66,7 +66,7 @@ class Curve:
         return CURVE_HEAD.pack(self.turns, len(pieces)) + pieces.tobytes()
 
     @classmethod
-    def read(cls, view: View, at: int, full_volts: float) -> Curve:
+    def read(cls, view: PackView, at: int, full_volts: float) -> Curve:
         """From a file.
 
         Raises
@@ -137,7 +137,7 @@ class LinkCurve:
         return CURVE_HEAD.pack(0, len(pieces)) + pieces.tobytes()
 
     @classmethod
-    def read(cls, view: View, at: int, links: int, lam_max: float) -> LinkCurve:
+    def read(cls, view: PackView, at: int, links: int, lam_max: float) -> LinkCurve:
         """From a file; raises as `Curve.read`."""
         _, count = view.unpack(CURVE_HEAD, at)
         pieces = view.array(links_type(links), count, at + CURVE_HEAD.size)

@@ -18,7 +18,7 @@ from ..errors import UnreadableWaveform
 
 __all__ = [
     "ANY", "ENTRY", "FRAME_HEAD", "LINKS", "MAGIC", "MOST_BYTES", "NO_PATTERN", "PART", "SUFFIX", "VERSION", "WAY_HEAD",
-    "Header", "View", "about_of", "curve_type", "frame_type", "links_type", "packed_about",
+    "Header", "PackView", "about_of", "curve_type", "frame_type", "links_type", "packed_about",
 ]  # fmt: skip
 
 MAGIC = b"dwpack\r\n"
@@ -75,7 +75,7 @@ class Header:
         return head + self._seal.pack(zlib.crc32(head))
 
     @classmethod
-    def of(cls, view: View) -> Self:
+    def of(cls, view: PackView) -> Self:
         """From the file.
 
         Raises
@@ -98,7 +98,7 @@ class Header:
 
 
 @dataclass(frozen=True)
-class View:
+class PackView:
     """A file in memory; what would reach beyond its end is refused."""
 
     path: Path
@@ -152,8 +152,8 @@ def packed_about(about: Mapping[str, Any]) -> bytes:
     return zlib.compress(json.dumps(about, allow_nan=False, separators=(",", ":")).encode("ascii"), 9)
 
 
-def about_of(view: View, at: int, length: int) -> dict[str, Any]:
-    """The object that `packed_about` made; raises as `View.bytes`."""
+def about_of(view: PackView, at: int, length: int) -> dict[str, Any]:
+    """The object that `packed_about` made; raises as `PackView.bytes`."""
     if not length:
         return {}
     unpacking = zlib.decompressobj()

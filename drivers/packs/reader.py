@@ -20,10 +20,10 @@ from encoders import TargetPattern
 from ..errors import DriverError, UnreadableWaveform
 from ..files.whole import check_plain, naming
 from .curves import Curve, LinkCurve
-from .layout import ANY, ENTRY, LINKS, PART, WAY_HEAD, Header, View, about_of, frame_type
+from .layout import ANY, ENTRY, LINKS, PART, WAY_HEAD, Header, PackView, about_of, frame_type
 from .writer import MOVING, PHASES
 
-__all__ = ["NotInPack", "Pack", "PackEntry", "Way"]
+__all__ = ["NotInPack", "Pack", "PackEntry", "RowWay"]
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class NotInPack(DriverError, LookupError):
 
 
 @dataclass(frozen=True)
-class Way:
+class RowWay:
     """What a row does in a frame, and what it is to be felt as.
 
     Attributes
@@ -100,7 +100,7 @@ class Pack:
         with naming(self.path), self.path.open("rb") as file:
             if not file.read(1):
                 raise UnreadableWaveform(f"{path}: this is no pack of dotwave")
-            self._view = View(self.path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+            self._view = PackView(self.path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
         self.header = Header.of(self._view)
         if self.header.entries_at + ENTRY.size * self.header.entries > self.header.length:
             self._view.damaged(self.header.entries_at)
@@ -211,7 +211,7 @@ class Pack:
         like = [one for one in names if PurePosixPath(one).stem == leaf] or get_close_matches(name, names, ALIKE)
         return f"; like it: {', '.join(like[:ALIKE])}" if like else "; `dotwave verify PACK` says what it has"
 
-    def _way(self, at: int) -> Way:
+    def _way(self, at: int) -> RowWay:
         flags, tones, parts, omega = self._view.unpack(WAY_HEAD, at)
         cols, phases = self.header.cols, bool(flags & PHASES)
         at += WAY_HEAD.size
@@ -226,7 +226,7 @@ class Pack:
         if len(links) > 1 or any(place >= self.places.shape[1] for place, _ in channels):
             self._view.damaged(at)
         target = tuple(0.0 if one is None else one for one in numbers[0])
-        return Way(
+        return RowWay(
             omega, bool(flags & MOVING), target, numbers[1], numbers[2] if phases else None, more, channels,
             links[0] if links else None,
         )  # fmt: skip

@@ -20,7 +20,7 @@ from ..errors import WaveformError
 from ..files.whole import atomic_file, naming
 from ..waveform.frame_entry import frame_entry
 from ..waveform.timeline import stretches
-from .courses import Course, CurveShelf, Part
+from .courses import CurveShelf, PackCourse, RowPart
 from .layout import (
     ANY,
     ENTRY,
@@ -107,7 +107,7 @@ class PackWriter:
         title = name.encode("utf-8", "surrogateescape")
         if title in self._entries:
             raise WaveformError(f"{name}: there are two of this name; give each its own")
-        course, frames, abouts = Course(self._shelf), bytearray(), list[dict[str, Any]]()
+        course, frames, abouts = PackCourse(self._shelf), bytearray(), list[dict[str, Any]]()
         headings, samples, pattern = list[dict[str, Any]](), 0, bytes([ANY]) * (self._device.rows * self._device.cols)
         for placed in stretches(self._device, plan.frames):
             frame, length = placed.plan, placed.stop - placed.first
@@ -176,10 +176,10 @@ class PackWriter:
     def _settled(self, frame: FramePlan, first: int, length: int) -> int:
         return min(length, math.ceil(frame.settled_s * self._device.amplifier.rate_hz - 1e-6) - first)
 
-    def _ways(self, entry: dict[str, Any] | None, parts: list[list[Part]]) -> list[int]:
+    def _ways(self, entry: dict[str, Any] | None, parts: list[list[RowPart]]) -> list[int]:
         return [self._keep(self._way(entry, row, of_row)) for row, of_row in enumerate(parts)]
 
-    def _way(self, entry: dict[str, Any] | None, row: int, parts: list[Part]) -> bytes:
+    def _way(self, entry: dict[str, Any] | None, row: int, parts: list[RowPart]) -> bytes:
         nothing = [0.0] * self._device.cols
         about = entry or {"moving": {row: False}, "omega": {row: 0.0}, "target": {row: nothing}, "wish": {row: nothing}}
         tones, phase = about["tones"][row] if "tones" in about else [], about.get("phase")

@@ -16,7 +16,7 @@ from ..errors import FileError, UnreadableWaveform
 from ..files.parts import Belongs
 from ..files.whole import atomic_files, check_plain, naming, settled
 from ..formats.samples import SampleReader, open_samples, writer_for
-from ..formats.table import PACK_SUFFIX, SUFFIXES, check_suffix
+from ..formats.table import FORMATS, PACK_SUFFIX, SUFFIXES, check_suffix
 from ..formats.wav import Encoding
 from .limits import LimitCheck
 from .manifest import Manifest, ManifestWriter, digest_of_open
@@ -136,9 +136,8 @@ def read_waveform(path: Path | str, icon: str | None = None) -> tuple[Manifest, 
     """
     path = Path(path)
     if path.suffix.lower() == PACK_SUFFIX:
-        from ..packs.opened import read_packed
-
-        return read_packed(path, icon)
+        packed: tuple[Manifest, SampleReader] = FORMATS[PACK_SUFFIX].reader_module().read_packed(path, icon)
+        return packed
     if icon is not None:
         raise FileError(f"{path}: only a pack ({PACK_SUFFIX}) has icons; leave out {icon!r}")
     # Imported here: whoever only writes has no manifest to check.
