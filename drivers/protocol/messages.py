@@ -115,7 +115,7 @@ class Links:
     def packet(self, number: int) -> Packet:
         """As bytes."""
         lam = struct.pack(f"<{len(self.lam)}f", *self.lam)
-        return Packet(Kind.LINKS, number, self._struct.pack(self.at, self.row, self.ramp) + lam)
+        return Packet(Kind.LINKS_TO, number, self._struct.pack(self.at, self.row, self.ramp) + lam)
 
     @classmethod
     def of(cls, packet: Packet) -> Links:

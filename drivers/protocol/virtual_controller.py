@@ -327,7 +327,7 @@ class VirtualController:
 def _event(packet: Packet) -> Event:
     kinds: dict[Kind, type[Event]] = {
         Kind.COUPLING: LinkCoupling,
-        Kind.LINKS: Links,
+        Kind.LINKS_TO: Links,
         Kind.BIAS: Bias,
         Kind.TONES: Tones,
         Kind.MARK: Mark,

@@ -126,10 +126,10 @@ def test_the_static_check_is_clean() -> None:
     assert done.returncode == 0, done.stderr
 
 
-COMMON = (Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE, Kind.MARK, Kind.LINKS)
+COMMON = (Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE, Kind.MARK, Kind.LINKS_TO)
 ITEMS = {
     Kind.COUPLING: (2,),
-    Kind.LINKS: (2,),
+    Kind.LINKS_TO: (2,),
     Kind.TONES: (0, 1, 2),
     Kind.ENVELOPE: (1, 4),
     Kind.SAMPLES: (20, 200),
