@@ -60,12 +60,12 @@ class _Felt(NamedTuple):
     way: float | None = None
 
 
-def verify(path: Path) -> VerifyReport:
+def verify(path: Path, icon: str | None = None) -> VerifyReport:
     """Integrate the device's full equations under the samples of `path` and say what is felt.
 
     Actuators that were measured are what they were measured to be.
 
-    Reads the samples and the manifest beside them, nothing else.
+    Reads the samples and the manifest beside them, nothing else; of a pack the one entry `icon`.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def verify(path: Path) -> VerifyReport:
         When the files cannot be used, or the samples are not those the manifest was written for.
     """
     began = time.perf_counter()
-    manifest, reader = read_waveform(path)
+    manifest, reader = read_waveform(path, icon)
     manifest.check_digest(reader.path)
     integration = _Integration(manifest)
     with progress("verifying") as update:

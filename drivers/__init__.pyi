@@ -37,6 +37,7 @@ from .formats.samples import (
 from .formats.table import (
     EXCHANGE_SUFFIXES as EXCHANGE_SUFFIXES,
     FORMATS as FORMATS,
+    PACK_SUFFIX as PACK_SUFFIX,
     SUFFIXES as SUFFIXES,
     Format as Format,
     check_suffix as check_suffix,
@@ -55,6 +56,16 @@ from .live.messages import (
     LiveEnded as LiveEnded,
     LiveMessages as LiveMessages,
     LiveSource as LiveSource,
+)
+from .packs.reader import (
+    NotInPack as NotInPack,
+    Pack as Pack,
+    PackEntry as PackEntry,
+)
+from .packs.writer import (
+    PackedEntry as PackedEntry,
+    PackWriter as PackWriter,
+    write_pack as write_pack,
 )
 from .protocol.emulator import (
     Emulator as Emulator,

@@ -1,4 +1,4 @@
-"""A plan into a file of any format: samples with their manifest, or a haptic file."""
+"""A plan into a file of any format: samples with their manifest, a pack, or a haptic file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from planner import Plan
 
-from .formats.table import format_of
+from .formats.table import PACK_SUFFIX, format_of
 from .formats.wav import Encoding
 from .waveform.file import write_waveform
 
@@ -23,12 +23,14 @@ class WrittenPlan:
 
     Attributes
     ----------
-    files : the samples and their manifest, or the haptic file.
-    peak_volts : largest voltage of any channel, None where no samples were written.
+    files : the samples and their manifest, the pack, or the haptic file.
+    peak_volts : largest voltage of any channel, None for a haptic file.
+    left_out : one sentence on what of the plan is not in a pack, empty where all is.
     """
 
     files: tuple[Path, ...]
     peak_volts: float | None
+    left_out: str = ""
 
 
 def write_plan(
@@ -57,6 +59,11 @@ def write_plan(
         When the ending of `path` stands for no format, or the file system refuses.
     """
     path = Path(path)
+    if path.suffix.lower() == PACK_SUFFIX:
+        from .packs.writer import write_pack
+
+        packed = write_pack(plan, path, progress=progress)
+        return WrittenPlan((path,), packed.peak_volts, packed.left_out)
     if not format_of(path).sample_bytes:
         # Imported here: most files are samples.
         from .exchange.file import write_exchange

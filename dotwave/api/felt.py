@@ -20,7 +20,9 @@ __all__ = ["Felt", "verify"]
 
 
 @overload
-def verify(what: Playable, *, devices: None = None, seed: int = 0, scheduler: str | None = None) -> Felt: ...
+def verify(
+    what: Playable, *, icon: str | None = None, devices: None = None, seed: int = 0, scheduler: str | None = None
+) -> Felt: ...
 
 
 @overload
@@ -28,7 +30,7 @@ def verify(what: Playable, *, devices: int, seed: int = 0, scheduler: str | None
 
 
 def verify(
-    what: Playable, *, devices: int | None = None, seed: int = 0, scheduler: str | None = None
+    what: Playable, *, icon: str | None = None, devices: int | None = None, seed: int = 0, scheduler: str | None = None
 ) -> Felt | AsBuiltReport:
     """Integrate the device's full equations under the samples of a waveform and say what is felt.
 
@@ -38,7 +40,9 @@ def verify(
     Parameters
     ----------
     what : path, ScenePlan or PlanWaveform
-        A written waveform (the samples or the manifest), a plan, or its waveform.
+        A written waveform (the samples or the manifest), a pack, a plan, or its waveform.
+    icon : str, optional
+        Name of the entry of a pack that has several.
     devices : int, optional
         Say instead what is felt on so many devices as built, drawn at random, with all that surrounds them.
     seed : int
@@ -76,7 +80,7 @@ def verify(
     name = None if isinstance(what, str | PathLike) else MEMORY
     with on_disk(what) as path:
         if devices is None:
-            return Felt.of(verify_file(path), name)
+            return Felt.of(verify_file(path, icon), name)
         from ..as_built.study import AsBuiltStudy, verify_as_built
 
         report = verify_as_built(path, AsBuiltStudy(devices, seed, scheduler))

@@ -30,6 +30,7 @@ from .command import (
     Contrast,
     Device,
     Explain,
+    Icon,
     Json,
     Language,
     Modulated,
@@ -166,6 +167,7 @@ def text(
 @app.command(short_help="Say what a written waveform makes felt.", rich_help_panel=LOOK)
 def verify(
     out: Written,
+    icon: Icon = None,
     as_built: Annotated[
         bool, typer.Option("--as-built", help="On many devices, with all that surrounds them in the profile.")
     ] = False,
@@ -193,10 +195,11 @@ def verify(
     from .options import refuse
 
     if as_built:
+        refuse("a check without --as-built", icon=icon)
         built = check(Path(out), devices=devices or 1000, seed=seed or 0, scheduler=scheduler)
         _finish(built, as_json, ok=built.ok)
     refuse("--as-built", devices=devices, seed=seed, scheduler=scheduler)
-    report = check(Path(out))
+    report = check(Path(out), icon=icon)
     _finish(report, as_json, ok=report.ok)
 
 
@@ -206,6 +209,7 @@ def preview(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Start of the file names; default: OUT's own.")
     ] = None,
+    icon: Icon = None,
     as_json: Json = False,
 ) -> None:
     """Verify a written waveform, then draw its frames: PNG, GIF, and the same as text for a screen reader.
@@ -220,7 +224,7 @@ def preview(
     from ..api.felt import verify as check
     from ..figures.preview import write_preview
 
-    report = write_preview(check(Path(out)), output or Path(out).with_suffix(".preview"))
+    report = write_preview(check(Path(out), icon=icon), output or Path(out).with_suffix(".preview"))
     _finish(report, as_json, ok=True)
 
 

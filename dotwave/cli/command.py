@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from drivers import SUFFIXES
+from drivers import PACK_SUFFIX, SUFFIXES
 from encoders import Undefined
 
 from ..errors import AppError
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..request import Request
 
 __all__ = [
-    "Actuator", "Budget", "Contrast", "Device", "Explain", "Json", "Language", "Modulated", "Output", "Pareto",
+    "Actuator", "Budget", "Contrast", "Device", "Explain", "Icon", "Json", "Language", "Modulated", "Output", "Pareto",
     "Scheduler", "Tol", "Unwritable", "Waveforms", "Workers", "Written", "Yes", "Yield", "finish", "finish_folder",
     "finish_run", "printable", "say",
 ]  # fmt: skip
@@ -42,10 +42,11 @@ Written = Annotated[
     str,
     typer.Argument(
         metavar="OUT",
-        help="A waveform written by `dotwave text` (.wav or .json).",
-        autocompletion=completed_files(*SUFFIXES, ".json"),
+        help="A waveform written by `dotwave text` (.wav or .json), or a pack (.dwp).",
+        autocompletion=completed_files(*SUFFIXES, PACK_SUFFIX, ".json"),
     ),
 ]
+Icon = Annotated[str | None, typer.Option(metavar="NAME", help="Which one of a pack (.dwp) that has several.")]
 Tol = Annotated[
     str | None,
     typer.Option(help="Largest error of full scale: draft, normal, fine or a number; says what it took."),

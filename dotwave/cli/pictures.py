@@ -105,6 +105,7 @@ def icons(
     device: Device = "paper-6x6",
     distinct: Annotated[bool, typer.Option("--distinct", help="Choose patterns that are not alike.")] = False,
     waveforms: Annotated[bool, typer.Option("--waveforms", help="Write a .wav for every icon.")] = False,
+    pack: Annotated[Path | None, typer.Option(help="A .dwp of all icons as events, to be played from memory.")] = None,
     closer_than: Annotated[int, typer.Option(min=0, help="List pairs that differ in fewer dots.")] = 2,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes side by side; default: all cores.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Work on a dask cluster: tcp://HOST:PORT.")] = None,
@@ -136,6 +137,7 @@ def icons(
         device=device, distinct=distinct, waveforms=waveforms, workers=workers, scheduler=scheduler,
         closer_than=closer_than, contrast_db=contrast, dwell_s=dwell, encoding=sample_format.value,
         tol=request.tol, budget_s=request.budget_s, yes=yes, icon_seconds=icon_seconds,
+        pack=pack,
     )  # fmt: skip
     report = render_icons(sources, output, options)
     finish(report, as_json, ok=report.ok)

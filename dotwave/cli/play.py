@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .command import Device, Json, Written, finish
+from .command import Device, Icon, Json, Written, finish
 from .help import PLAY
 
 __all__ = ["commands"]
@@ -46,6 +46,7 @@ def play(
     audio: Annotated[str | None, typer.Option(help="Sound card, by name or number; '' is the default one.")] = None,
     channels: Annotated[str | None, typer.Option("--map", help="Sound card outputs: channel:output,...")] = None,
     to: Annotated[str | None, typer.Option(metavar="NAME:PLACE", help="Any sink, also one of another package.")] = None,
+    icon: Icon = None,
     adapt: Annotated[bool, typer.Option("--adapt", help="Correct while playing, from what is measured.")] = False,
     noise: Annotated[float, typer.Option(min=0, max=0.5, help="Of a sensor, share of full scale; --adapt.")] = 0.002,
     amplitudes: Annotated[bool, typer.Option("--amplitudes", help="The sensors tell no phases; --adapt.")] = False,
@@ -70,7 +71,7 @@ def play(
 
     report = run(
         Path(out), live=live, port=port, board=board is not None, audio=audio, to=to, baud=baud, patience_s=patience,
-        parametric=parametric or None,
+        parametric=parametric or None, icon=icon,
         firmware=None if firmware is None else Firmware(firmware.value), mapping=channels,
         adapt=Adapting(noise, not amplitudes) if adapt else None,
     )  # fmt: skip

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from chainsim import load_device
-from drivers import naming
+from drivers import PACK_SUFFIX, naming
 from encoders import Frame, PictureOptions, TargetPattern
 
 from ..errors import AppError
@@ -62,6 +63,8 @@ def render_icons(
         dwell_s=options.dwell_s,
         candidates=CANDIDATES if options.distinct else 1,
     )
+    if options.pack is not None and options.pack.suffix.lower() != PACK_SUFFIX:
+        raise AppError(f"--pack {options.pack}: expected a name that ends in {PACK_SUFFIX}")
     recipe = Recipe(device, picture, options.contrast_db, options.encoding, versions())
     places = find_icons(sources)
     if options.waveforms:
@@ -82,7 +85,16 @@ def render_icons(
             write_report(run.report(complete=False, seconds=clock() - began), out, pictures=False)
             raise
         report = run.report(complete=True, seconds=clock() - began)
-    return write_report(report, out, pictures=True)
+    report = write_report(report, out, pictures=True)
+    return report if options.pack is None else _with_pack(report, recipe, options.pack)
+
+
+def _with_pack(report: IconsReport, recipe: Recipe, path: Path) -> IconsReport:
+    # Imported here: most sets are written without.
+    from .pack import write_icon_pack
+
+    packed = write_icon_pack(report.icons, recipe, path)
+    return replace(report, files=(*report.files, packed.path), reached=(*report.reached, packed.sentence))
 
 
 def _check_own(out: Path) -> None:

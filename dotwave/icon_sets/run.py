@@ -50,6 +50,7 @@ class IconOptions:
     budget_s : seconds for the work on the set; what is not begun then is left for the next run. None for any.
     yes : do not ask before very much.
     icon_seconds : processor time that one icon may take, on this machine.
+    pack : a pack of all of them to write, too.
     """
 
     device: str = "paper-6x6"
@@ -65,6 +66,7 @@ class IconOptions:
     budget_s: float | None = None
     yes: bool = False
     icon_seconds: float = TASK_S
+    pack: Path | None = None
 
 
 @dataclass

@@ -44,6 +44,7 @@ __all__ = [
     "Task",
     "all_of_batch",
     "encode_icons",
+    "icon_plan",
     "plan_patterns",
     "versions",
     "write_waves",
@@ -186,6 +187,13 @@ def _written(recipe: Recipe, task: Task) -> Record:
         return {"key": task.key, "wav": path.read_bytes(), "json": path.with_suffix(".json").read_bytes()}
 
 
+def icon_plan(recipe: Recipe, amplitude: Floats) -> Plan:
+    """The plan of a pattern, float64, shape (rows, cols), from rest and back to it; good until the next one is made."""
+    frames, plan = _planner(recipe)
+    frames.frame = _frame(recipe, amplitude)
+    return plan
+
+
 def _frame(recipe: Recipe, amplitude: Floats) -> Frame:
     target = amplitude.astype(np.complex128)
     target.flags.writeable = False
@@ -207,16 +215,15 @@ _ONE_AT_A_TIME = threading.Lock()
 @lru_cache(maxsize=4)
 def _planner(recipe: Recipe) -> tuple[_Frames, Plan]:
     frames = _Frames()
-    return frames, plan_scene(Scene(recipe.shape, frames), recipe.device, contrast_db=recipe.contrast_db)
+    scene = Scene(recipe.shape, frames, {"kind": "icon"})
+    return frames, plan_scene(scene, recipe.device, contrast_db=recipe.contrast_db)
 
 
 def _planned(recipe: Recipe, amplitude: Floats) -> Record:
     # A worker of a cluster may run several tasks in threads.
     with _ONE_AT_A_TIME:
-        frames, plan = _planner(recipe)
-        frames.frame = _frame(recipe, amplitude)
         try:
-            planned = list(plan.frames)
+            planned = list(icon_plan(recipe, amplitude).frames)
         except PlanError as problem:
             return {"outcome": "not_planned", "error": None, "note": " ".join(str(problem).split())}
     failed = next((frame for frame in planned if frame.outcome is not Outcome.OK), None)

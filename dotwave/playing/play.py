@@ -136,6 +136,7 @@ def play(
     to: str | None = None,
     limits: GateLimits | None = None,
     adapt: Adapting | None = None,
+    icon: str | None = None,
     **options: object,
 ) -> PlayReport:
     """Hold a written waveform against the safety gate and, when `live`, play it.
@@ -148,6 +149,7 @@ def play(
     limits : of the actuators and the amplifier where they are known; None: those of the
         profile.
     adapt : correct while playing, from what the controller measures.
+    icon : name of the entry of a pack that has several.
     options : of the sink (`drivers.open_sink`); None is left out.
 
     Raises
@@ -160,7 +162,7 @@ def play(
     address = _address(port, board, audio, to)
     if live and (address is None or (board and port is None)):
         raise AppError(f"--live: {SINKS}; `dotwave ports` lists ports")
-    manifest, reader = read_waveform(path)
+    manifest, reader = read_waveform(path, icon)
     limits = limits or GateLimits.of(manifest.device, len(manifest.channels))
     given = {name: value for name, value in options.items() if value is not None}
     adaptation = None

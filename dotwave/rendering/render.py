@@ -142,6 +142,7 @@ def _report(
 ) -> Report:
     device, totals = passage.plan.device, passage.totals
     peak = totals.volts * device.amplifier.volts
+    left_out = (written.left_out,) if written is not None and written.left_out else ()
     said: dict[str, Any] = totals.of_report() | {
         "device": device.name,
         "files": () if written is None else tuple(map(str, written.files)),
@@ -151,7 +152,7 @@ def _report(
     }
     if isinstance(scene, TextScene):
         found = text_findings(scene)
-        notes = (*found.notes, *shown, *passage.notes())
+        notes = (*found.notes, *shown, *passage.notes(), *left_out)
         return TextReport(
             tables=tuple(scene.encoding["tables"]), text=scene.text_frames.source.text[:200], pages=totals.pages,
             undefined=found.undefined, split=found.split, differences=found.differences, notes=notes, **said,
@@ -159,4 +160,4 @@ def _report(
     # Imported here: a text does without.
     from ..reports.scene import SceneReport
 
-    return SceneReport(parts=scene.parts, tolerance=request.tol, notes=tuple(passage.notes()), **said)
+    return SceneReport(parts=scene.parts, tolerance=request.tol, notes=(*passage.notes(), *left_out), **said)

@@ -9,7 +9,7 @@
 #include "playout.h"
 #include "session.h"
 
-#define VERSION 5u
+#define VERSION 6u
 #define KEYS_SINCE 4u
 #define KEYS_EVERY_US 50000u
 #define ACK_EVERY_US 20000u
@@ -191,7 +191,7 @@ static void take(const dw_packet *packet)
     case DW_STATUS:
     case DW_HEARTBEAT: break;
     case DW_COUPLING: case DW_BIAS: case DW_TONES: case DW_MARK: case DW_SAMPLES: case DW_END: case DW_MEASURE:
-    case DW_ENVELOPE: take_ordered(packet); break;
+    case DW_ENVELOPE: case DW_LINKS_TO: take_ordered(packet); break;
     default: return; /* another controller's */
     }
     ack_due = 1;

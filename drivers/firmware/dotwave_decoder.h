@@ -1,4 +1,4 @@
-/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), versions 1 to 5.
+/* Reference decoder and encoder for the dotwave controller protocol (see ../PROTOCOL.md), versions 1 to 6.
  *
  * C99, one header, no allocation, no library but <stdint.h> and <stddef.h>. Feed it every byte that comes; it
  * passes over whatever is no packet, and never reads or writes outside its own struct, whatever the bytes are.
@@ -25,7 +25,7 @@
 enum dw_kind {
     DW_HELLO = 0x01, DW_STATUS = 0x02, DW_HEARTBEAT = 0x03, DW_STOP = 0x04, DW_KEYED = 0x05,
     DW_START = 0x10, DW_COUPLING = 0x11, DW_BIAS = 0x12, DW_TONES = 0x13, DW_MARK = 0x14, DW_SAMPLES = 0x15,
-    DW_END = 0x16, DW_MEASURE = 0x17, DW_ENVELOPE = 0x18,
+    DW_END = 0x16, DW_MEASURE = 0x17, DW_ENVELOPE = 0x18, DW_LINKS_TO = 0x19,
     DW_CAPABILITIES = 0x81, DW_ACK = 0x82, DW_MARKED = 0x83, DW_REFUSED = 0x84, DW_MEASURED = 0x85, DW_KEY = 0x86
 };
 
@@ -99,6 +99,7 @@ static inline int dw_length_fits(uint8_t kind, uint32_t length)
     case DW_END: fixed = 8; item = 0; break;
     case DW_MEASURE: fixed = 16; item = 8; break;
     case DW_ENVELOPE: fixed = 22; item = 8; break;
+    case DW_LINKS_TO: fixed = 14; item = 4; break;
     case DW_CAPABILITIES: fixed = 45; item = 1; break;
     case DW_ACK: fixed = 58; item = 4; break;
     case DW_MARKED: fixed = 20; item = 0; break;

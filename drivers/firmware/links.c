@@ -10,7 +10,8 @@
 typedef struct {
     int64_t at[DW_LINKS], by[DW_LINKS];
     uint32_t left;
-    uint16_t end[DW_LINKS], told[DW_LINKS];
+    uint32_t end[DW_LINKS]; /* codes / 2^16 */
+    uint16_t told[DW_LINKS];
 } row_links;
 
 static row_links rows[DW_ROWS];
@@ -28,7 +29,7 @@ static void tell(uint32_t row)
 
 static void stand(row_links *r)
 {
-    for (uint32_t i = 0; i < DW_LINKS; i++) r->at[i] = (int64_t)r->end[i] << FINE;
+    for (uint32_t i = 0; i < DW_LINKS; i++) r->at[i] = (int64_t)r->end[i] << (FINE - 16);
     r->left = 0;
 }
 
@@ -54,7 +55,7 @@ void dw_links_stay(void)
     for (uint32_t row = 0; row < DW_ROWS; row++) rows[row].left = 0;
 }
 
-void dw_links_glide(uint32_t row, uint32_t ramp, const uint16_t *codes)
+void dw_links_glide(uint32_t row, uint32_t ramp, const uint32_t *codes)
 {
     row_links *r = &rows[row];
     uint64_t share = dw_share_of(ramp);
@@ -65,7 +66,7 @@ void dw_links_glide(uint32_t row, uint32_t ramp, const uint16_t *codes)
         return;
     }
     for (uint32_t i = 0; i < DW_LINKS; i++)
-        r->by[i] = dw_part_of(((int64_t)codes[i] << FINE) - r->at[i], share);
+        r->by[i] = dw_part_of(((int64_t)codes[i] << (FINE - 16)) - r->at[i], share);
 }
 
 void dw_links_tell(void)

@@ -163,7 +163,8 @@ static void tell(const dw_event *event)
 static int carry_out(const dw_event *e)
 {
     switch (e->kind) {
-    case DW_COUPLING: dw_links_glide(e->index, e->ramp, e->what.links); return 1;
+    case DW_COUPLING:
+    case DW_LINKS_TO: dw_links_glide(e->index, e->ramp, e->what.links); return 1;
     case DW_BIAS: return dw_bias(e->at, e->index, e->ramp, e->what.bias);
     case DW_TONES: return dw_tones(e->at, e->index, e->ramp, e->what.tones, e->count);
     case DW_ENVELOPE: return dw_envelope(e->at, e->index, e->ramp, e->what.envelope.turns, e->what.envelope.points);

@@ -18,7 +18,7 @@ typedef struct {
     union {
         uint32_t frame;
         int32_t bias;
-        uint16_t links[DW_LINKS];
+        uint32_t links[DW_LINKS]; /* codes / 2^16 */
         dw_tone tones[DW_TONES_MOST];
         struct {
             uint64_t turns;

@@ -72,8 +72,22 @@ static int coupling(const dw_packet *packet, dw_event *event)
     const uint8_t *p = packet->payload + 14;
     if (event->index >= DW_ROWS || packet->length != 14u + 2u * DW_LINKS) return 0;
     for (uint32_t i = 0; i < DW_LINKS; i++) {
-        event->what.links[i] = dw_u16(p + 2u * i);
-        if ((double)event->what.links[i] * (double)DW_LAM_STEP > (double)DW_LAM_MAX * (1 + 1e-6)) return 0;
+        uint32_t code = dw_u16(p + 2u * i);
+        if ((double)code * (double)DW_LAM_STEP > (double)DW_LAM_MAX * (1 + 1e-6)) return 0;
+        event->what.links[i] = code << 16;
+    }
+    return 1;
+}
+
+/* The same, in floats. */
+static int links_to(const dw_packet *packet, dw_event *event)
+{
+    const uint8_t *p = packet->payload + 14;
+    if (event->index >= DW_ROWS || packet->length != 14u + 4u * DW_LINKS) return 0;
+    for (uint32_t i = 0; i < DW_LINKS; i++) {
+        double lam = (double)dw_f32(p + 4u * i), code = lam / (double)DW_LAM_STEP;
+        if (!(lam >= 0 && lam <= (double)DW_LAM_MAX * (1 + 1e-6))) return 0;
+        event->what.links[i] = code < 65535.0 ? (uint32_t)(code * 65536.0 + 0.5) : 0xffff0000u;
     }
     return 1;
 }
@@ -135,6 +149,9 @@ static int checked(const dw_packet *packet, dw_event *event, dw_text *why)
     case DW_COUPLING:
         if (coupling(packet, event)) return 1;
         return refused_numbers(why, "coupling: rows 0..", DW_ROWS - 1u, ", ", DW_LINKS, " links of at most lam_max");
+    case DW_LINKS_TO:
+        if (links_to(packet, event)) return 1;
+        return refused_numbers(why, "links: rows 0..", DW_ROWS - 1u, ", ", DW_LINKS, " links of 0 to lam_max");
     case DW_BIAS:
     case DW_TONES:
         if (packet->kind == DW_BIAS ? bias(packet, event) : tones(packet, event)) {

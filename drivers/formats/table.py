@@ -11,14 +11,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-__all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "SUFFIXES", "Format", "check_suffix", "format_of"]
+__all__ = ["EXCHANGE_SUFFIXES", "FORMATS", "PACK_SUFFIX", "SUFFIXES", "Format", "check_suffix", "format_of"]
 
 
 @dataclass(frozen=True)
 class Format:
     """What is known of a format without importing its module.
 
-    A module of samples has ``open_writer(file, channels, rate_hz, encoding)``, which gives a `SampleWriter`, and
+    That which reads packs has ``read_packed(path, name)``, the manifest and `SampleReader` of an entry. A module of
+    samples has ``open_writer(file, channels, rate_hz, encoding)``, which gives a `SampleWriter`, and
     ``open_reader(path, channels, rate_hz)``, which gives a `SampleReader`. One of a haptic file, which carries no
     samples and has no manifest beside it, has ``content_of(plan, actuator)``, the content as plain JSON types, and
     ``curves_of(content)``, the `HapticCurves` of a content that keeps the rules of the format.
@@ -57,16 +58,20 @@ FORMATS: Mapping[str, Format] = {
     ".raw": Format(
         "float32 of full scale, little-endian, channels interleaved, no header", ".raw", ".raw", {"float32": (4, 4)}
     ),
+    ".dwp": Format("a pack: events in place of samples, no manifest", "..packs.writer", "..packs.opened"),
     ".hjif": Format("levels, times and phases of the whole grid", "..exchange.hjif", "..exchange.hjif"),
     ".ahap": Format("levels and times of one actuator, or the mean", "..exchange.ahap", "..exchange.ahap"),
     ".haptic": Format("levels and times of one actuator, or the mean", "..exchange.haptic", "..exchange.haptic"),
 }  # fmt: skip
-"""Ending of a name -> its format: those of samples, then haptic files."""
+"""Ending of a name -> its format: those of samples, then packs and haptic files."""
 
 SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if form.sample_bytes)
 """Endings of samples."""
 
-EXCHANGE_SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if not form.sample_bytes)
+PACK_SUFFIX = ".dwp"
+"""Ending of packs (docs/pack.md)."""
+
+EXCHANGE_SUFFIXES = tuple(suffix for suffix, form in FORMATS.items() if not form.sample_bytes and suffix != PACK_SUFFIX)
 """Endings of haptic files."""
 
 

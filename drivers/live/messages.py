@@ -77,7 +77,7 @@ class LiveMessages:
     ) -> None:  # fmt: skip
         check_fit_for(device, found, device.coupling.lam.max)
         self._device, self._found, self._source = device, found, source
-        self._wave, self._links = LiveWave(device), CouplingWriter(device)
+        self._wave, self._links = LiveWave(device), CouplingWriter(device, sampled=True)
         self._limits = limits or GateLimits.of(device, len(channels_of(device)))
         self._stream = GatedStream(device, found, self._limits, refused=REFUSED)
         self._open = found.version >= OPEN_SINCE

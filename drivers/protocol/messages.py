@@ -17,6 +17,7 @@ __all__ = [
     "Bias",
     "Codes",
     "LinkCoupling",
+    "Links",
     "Mark",
     "SamplesMessage",
     "StartMessage",
@@ -26,7 +27,7 @@ __all__ = [
 
 Codes = NDArray[np.int16]
 
-VERSION = 5  # the newest spoken here; a controller and a host speak the newest that both know
+VERSION = 6  # the newest spoken here; a controller and a host speak the newest that both know
 PARAMETRIC, PREFILL = 1, 2  # bits of START's mode
 FULL_CODE = 32767  # the sample code of full_volts; -32768 is not used
 
@@ -93,6 +94,34 @@ class LinkCoupling:
         at, row, ramp = cls._struct.unpack_from(packet.payload)
         rest = packet.payload[cls._struct.size :]
         return cls(at, row, ramp, struct.unpack(f"<{len(rest) // 2}H", rest))
+
+
+@dataclass(frozen=True)
+class Links:
+    """The same in numbers that a controller need not round: from version 6 on.
+
+    Attributes
+    ----------
+    lam : cols - 1 numbers.
+    """
+
+    at: int
+    row: int
+    ramp: int
+    lam: tuple[float, ...]
+
+    _struct: ClassVar = struct.Struct("<QHI")
+
+    def packet(self, number: int) -> Packet:
+        """As bytes."""
+        lam = struct.pack(f"<{len(self.lam)}f", *self.lam)
+        return Packet(Kind.LINKS_TO, number, self._struct.pack(self.at, self.row, self.ramp) + lam)
+
+    @classmethod
+    def of(cls, packet: Packet) -> Links:
+        """From bytes."""
+        rest = packet.payload[cls._struct.size :]
+        return cls(*(*cls._struct.unpack_from(packet.payload), struct.unpack(f"<{len(rest) // 4}f", rest)))
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from chainsim import Device
 from ..channels import Channel, Role, channels_of
 from ..errors import DriverError
 from ..formats.samples import SampleReader
-from ..waveform.coupling import CouplingEvent
+from ..waveform.coupling import CouplingEvent, on_samples
 from ..waveform.manifest import Manifest
 from ..waveform.shaping import Shaper
 from .measured import Measure, turns_of
-from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage
+from .messages import FULL_CODE, VERSION, Codes, LinkCoupling, Links, Mark, SamplesMessage, StartMessage
 from .packet import Kind, Packet
 from .playout import Event
 from .record import frame_note, scene_note
@@ -33,6 +33,7 @@ __all__ = [
 
 # A packet lasts at most so long, so that what is lost with one costs little to send again.
 PACKET_S = 0.006
+LINKS_SINCE = 6  # version
 START_FIXED, PREFILL_FIXED, MARK_FIXED = 17, 4, 12  # bytes before the notes of START and MARK
 
 
@@ -113,8 +114,8 @@ def session_messages(
     """START, then samples with the events before the samples they belong to, then END.
 
     A sample becomes one of 65535 codes: a constant voltage the nearest, a drive one within two steps, so that the
-    error lies high above the resonances (`Shaper`). Links become the nearest multiple of lam_step; times of events
-    the nearest sample.
+    error lies high above the resonances (`Shaper`). Links become the nearest multiple of lam_step,
+    from version 6 on they are not rounded; times of events become the nearest sample.
 
     Raises
     ------
@@ -143,17 +144,20 @@ def _messages(manifest: Manifest, reader: SampleReader, found: Capabilities, ses
     yield End(first)
 
 
-def start_of(session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0) -> StartMessage:
+def start_of(
+    session: int, found: Capabilities, total: int, note: bytes, prefill_s: float = 0.0, *, parametric: bool = False
+) -> StartMessage:
     """START, its note where there is room for it.
 
     Parameters
     ----------
     total : samples; 0 is open.
     prefill_s : seconds in store that are enough to begin, where the controller knows of that; 0: half of its buffer.
+    parametric : no samples follow.
     """
     prefill = max(1, round(prefill_s * found.rate_hz)) if prefill_s and found.version >= OPEN_SINCE else 0
     fixed = START_FIXED + (PREFILL_FIXED if prefill else 0)
-    return StartMessage(session, False, found.rate_hz, total, fitting(note, found, fixed), prefill)
+    return StartMessage(session, parametric, found.rate_hz, total, fitting(note, found, fixed), prefill)
 
 
 def block_of(found: Capabilities) -> int:
@@ -184,15 +188,19 @@ class Coder:
 
 def links_of(manifest: Manifest, found: Capabilities) -> Iterator[Event]:
     """What moves the links, by time."""
+    device = manifest.device
+    events = on_samples(manifest.coupling, manifest.rate_hz, device.rows, device.cols)
     # Events go by time; in the manifest they do so within each row only.
-    for event in sorted(manifest.coupling, key=lambda event: event.t_s):
+    for event in sorted(events, key=lambda event: event.t_s):
         yield link_coupling(event, found)
 
 
-def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling:
-    """Links that move, as a controller is told of them."""
+def link_coupling(event: CouplingEvent, found: Capabilities) -> LinkCoupling | Links:
+    """Links that move, as a controller is told of them; one of version 6 need not round them."""
     at = round(event.t_s * found.rate_hz)
     ramp = max(0, round((event.t_s + event.ramp_s) * found.rate_hz) - at)
+    if found.version >= LINKS_SINCE:
+        return Links(at, event.row, ramp, event.lam)
     step = found.lam_step or 1.0
     return LinkCoupling(at, event.row, ramp, tuple(min(65535, round(lam / step)) for lam in event.lam))
 

@@ -47,6 +47,7 @@ class Kind(IntEnum):
     END = 0x16
     MEASURE = 0x17
     ENVELOPE = 0x18
+    LINKS_TO = 0x19
     CAPABILITIES = 0x81
     ACK = 0x82
     MARKED = 0x83
@@ -55,7 +56,7 @@ class Kind(IntEnum):
     KEY = 0x86
 
 
-ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.ENVELOPE)
+ORDERED = frozenset(kind for kind in Kind if Kind.START <= kind <= Kind.LINKS_TO)
 
 
 class Shape(NamedTuple):
@@ -80,6 +81,7 @@ SHAPES = {
     Kind.END: Shape(8, 0),
     Kind.MEASURE: Shape(16, 8),
     Kind.ENVELOPE: Shape(22, 8),
+    Kind.LINKS_TO: Shape(14, 4),
     Kind.CAPABILITIES: Shape(45, 1),
     Kind.ACK: Shape(58, 4),
     Kind.MARKED: Shape(20, 0),

@@ -15,12 +15,12 @@ from ..formats.samples import SampleReader
 from ..waveform.manifest import FrameMark, Manifest
 from .envelope import Envelope
 from .measured import turns_of
-from .messages import StartMessage
-from .outgoing import End, Message, UnfitController, check_fit, links_of, marks_of
+from .outgoing import End, Message, UnfitController, check_fit, links_of, marks_of, start_of
 from .pieces import NoPiece, pieces_of
+from .record import scene_note
 from .replies import Capabilities
 
-__all__ = ["ENVELOPES_SINCE", "NotParametric", "ParametricSession"]
+__all__ = ["ENVELOPES_SINCE", "NotParametric", "ParametricSession", "check_draws"]
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +68,11 @@ class ParametricSession:
                 found += one.draw(stretch, np.ascontiguousarray(volts[:, one.channel.index]))
         return cls(manifest, tuple(sorted(found, key=lambda envelope: envelope.at)))
 
+    @property
+    def pieces(self) -> int:
+        """How many envelopes are sent."""
+        return len(self.envelopes)
+
     def messages(self, found: Capabilities, *, session: int) -> Iterator[Message]:
         """START, the events by time, END.
 
@@ -77,15 +82,26 @@ class ParametricSession:
             Before anything, when the controller is not one for this waveform.
         """
         check_fit(self.manifest, found, parametric=True)
-        if found.version < ENVELOPES_SINCE:
-            raise UnfitController(f"controller {found.name!r}: it knows no envelopes; stream, or update the firmware")
+        check_draws(found)
         return self._messages(found, session)
 
     def _messages(self, found: Capabilities, session: int) -> Iterator[Message]:
         events = [*links_of(self.manifest, found), *self.envelopes, *marks_of(self.manifest, found)]
-        yield StartMessage(session, True, self.manifest.rate_hz, self.manifest.samples)
+        yield start_of(session, found, self.manifest.samples, scene_note(self.manifest), parametric=True)
         yield from sorted(events, key=lambda event: event.at)
         yield End(self.manifest.samples)
+
+
+def check_draws(found: Capabilities) -> None:
+    """Refuse a controller that draws no envelopes.
+
+    Raises
+    ------
+    UnfitController
+        With the cure.
+    """
+    if found.version < ENVELOPES_SINCE:
+        raise UnfitController(f"controller {found.name!r}: it knows no envelopes; stream, or update the firmware")
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def _told(
     manifest: Manifest, frames: Iterable[FramePlan], found: Capabilities, stream: GatedStream
 ) -> Iterator[FramePlan]:
     """The frames; what happens in one is known once it is drawn."""
-    links, number = CouplingWriter(manifest.device), 0
+    links, number = CouplingWriter(manifest.device, sampled=True), 0
     for frame in frames:
         events: list[Event] = []
         if frame.frame is not None:

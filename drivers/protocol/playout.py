@@ -16,14 +16,14 @@ from ..channels import channels_of
 from .early import MOST_EARLY
 from .envelope import Envelope, EnvelopeMix
 from .measured import Measure
-from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Mark, Tones
+from .messages import FULL_CODE, Bias, Codes, LinkCoupling, Links, Mark, Tones
 from .replies import Marked, State
 from .synthesis import Glide, ToneMix
 
 __all__ = ["BUFFER_S", "ControllerSpec", "Event", "OutputBlock", "Playout"]
 
 Floats = NDArray[np.float64]
-Event = LinkCoupling | Bias | Tones | Envelope | Mark | Measure
+Event = LinkCoupling | Links | Bias | Tones | Envelope | Mark | Measure
 
 BLOCK = 256
 BUFFER_S = 2.0  # what a host on a busy machine needs; see PROTOCOL.md
@@ -252,6 +252,8 @@ class Playout:
             elif isinstance(event, LinkCoupling):
                 lam = np.array(event.codes) * self._spec.lam_step
                 self._lam[event.row] = self._lam[event.row].then(event.at, event.ramp, lam)
+            elif isinstance(event, Links):
+                self._lam[event.row] = self._lam[event.row].then(event.at, event.ramp, event.lam)
             elif isinstance(event, Bias):
                 self._bias[event.channel] = self._bias[event.channel].then(event.at, event.ramp, [event.volts])
             elif isinstance(event, Tones):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chainsim import Device
 
@@ -19,7 +20,7 @@ from ..errors import FileError
 from ..files.whole import atomic_files, naming
 from ..formats.wav import WavWriter
 from ..waveform.manifest import SCHEMA, FrameMark, Manifest, digest_of_open
-from .messages import FULL_CODE, Codes, LinkCoupling, Mark, StartMessage
+from .messages import FULL_CODE, Codes, LinkCoupling, Links, Mark, StartMessage
 from .playout import ControllerSpec, Event
 
 __all__ = ["ArrivalRecorder", "CutShort", "device_note", "frame_note", "live_note", "plan_note", "scene_note"]
@@ -94,11 +95,12 @@ class ArrivalRecorder:
     """Writes what arrives in one session to a .wav (float32) and the manifest beside it.
 
     A sample is code / 32767 of the channel's volts per unit; float32 gives every code back exactly. Events
-    stand at their samples. Frames come from the notes of the marks; a mark without a note has no frame in the
-    record, and a frame without an end ends at the next mark with a note, or with the session. The files appear when the
-    session's END arrives, or when it is cut short: then they hold the samples that arrived and the frames that stood in
-    them, and the manifest says ``"complete": false``. A new session writes them anew; one of which no sample arrived
-    leaves them as they are.
+    stand at their samples. Of a session without samples it keeps those that the controller drew. Frames come from the
+    notes of the marks; a mark without a note has no frame in the record, and a frame without an end ends at the next
+    mark with a note, or with the session. The files appear when the session's END arrives and, without samples, all has
+    gone out, or when it is cut short: then they hold the samples that arrived and the frames that stood in them, and
+    the manifest says ``"complete": false``. A new session writes them anew; one of which no sample arrived leaves them
+    as they are.
 
     Attributes
     ----------
@@ -149,11 +151,19 @@ class ArrivalRecorder:
         with naming(self._path):
             self._writer.write(codes.astype(np.float64) * (self._device.amplifier.volts / FULL_CODE))
 
+    def drawn(self, volts: NDArray[np.float64]) -> None:
+        """Samples that a controller drew of a session without any, float64, shape (S, channels), volts."""
+        with naming(self._path):
+            self._writer.write(volts)
+
     def event(self, event: Event) -> None:
         """Something to do at a sample."""
         rate = self._device.amplifier.rate_hz
-        if isinstance(event, LinkCoupling):
-            lam = [code * self._lam_step for code in event.codes]
+        if isinstance(event, LinkCoupling | Links):
+            if isinstance(event, LinkCoupling):
+                lam = [code * self._lam_step for code in event.codes]
+            else:
+                lam = list(event.lam)
             times = {"t_s": event.at / rate, "ramp_s": event.ramp / rate}
             self._coupling.append({"row": event.row, "lam": lam, **times})
         elif isinstance(event, Mark) and (frame := _unpacked(event.note)):

@@ -11,11 +11,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .early import EarlyPackets
 from .envelope import LONGEST_PIECE, Envelope
 from .keys import KeyEvent, KeyWaiting
 from .measured import Measure, parts_of
-from .messages import VERSION, Bias, Codes, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones
+from .messages import VERSION, Bias, Codes, LinkCoupling, Links, Mark, SamplesMessage, StartMessage, Tones
 from .metering import Meter, Senses
 from .packet import MAX_PAYLOAD, ORDERED, Kind, Packet, PacketReader, encode
 from .playout import ControllerSpec, Event, OutputBlock, Playout
@@ -36,6 +39,10 @@ class Recorder(Protocol):
 
     def samples(self, codes: Codes) -> None:
         """Samples, int16, shape (S, channels)."""
+        ...
+
+    def drawn(self, volts: NDArray[np.float64]) -> None:
+        """Samples of a session without samples, as the controller draws them; float64, shape (S, channels), volts."""
         ...
 
     def event(self, event: Event) -> None:
@@ -78,9 +85,10 @@ class VirtualController:
         self.name = name
         self._on_output = on_output
         self._meter = None if senses is None else Meter(spec.rows, spec.cols, senses)
-        self.playout = Playout(spec, now, on_output if self._meter is None else self._put_out)
+        seen = any(one is not None for one in (on_output, senses, recorder))
+        self.playout = Playout(spec, now, self._put_out if seen else None)
         self.session = 0
-        self._recorder = recorder
+        self._recorder, self._drawing = recorder, False
         self._reader = PacketReader()
         self._early = EarlyPackets(spec.early_packets)
         self._keys = KeyWaiting()
@@ -139,14 +147,19 @@ class VirtualController:
     def _advance(self, now: float) -> None:
         for marked in self.playout.advance(now):
             self._send(marked.packet())
+        if self._drawing and self._recorder is not None and self.playout.state is State.DONE:
+            self._drawing = False
+            self._recorder.end()
         for measured in () if self._meter is None else self._meter.finished():
             for part in parts_of(measured, self.session):
                 self._send(part.packet())
         self._now = now
 
     def _put_out(self, block: OutputBlock) -> None:
-        assert self._meter is not None
-        self._meter.take(block)
+        if self._meter is not None:
+            self._meter.take(block)
+        if self._drawing and self._recorder is not None and block.live:
+            self._recorder.drawn(block.volts)
         if self._on_output is not None:
             self._on_output(block)
 
@@ -163,7 +176,7 @@ class VirtualController:
             self.playout.hold(State.STOPPED)
             self.playout.clear()
             self._forget()
-            self.session, self._ack_due = 0, True
+            self.session, self._ack_due, self._drawing = 0, True, False
         elif packet.kind is Kind.KEYED:
             self._keys.answered(packet)
         elif packet.kind in (Kind.STATUS, Kind.HEARTBEAT):
@@ -206,6 +219,7 @@ class VirtualController:
         self.session, self._events, self._total = start.session, 0, start.total
         if self._recorder is not None:
             self._recorder.start(start)
+        self._drawing = start.parametric
 
     def _forget(self) -> None:
         self._early.clear()
@@ -257,6 +271,10 @@ class VirtualController:
             fits = event.row < spec.rows and len(event.codes) == spec.cols - 1
             if not fits or max(event.codes, default=0) * spec.lam_step > spec.lam_max * (1 + 1e-6):
                 raise _Refusal(f"coupling: rows 0..{spec.rows - 1}, {spec.cols - 1} links of at most lam_max")
+        elif isinstance(event, Links):
+            fits = event.row < spec.rows and len(event.lam) == spec.cols - 1
+            if not fits or not all(0 <= lam <= spec.lam_max * (1 + 1e-6) for lam in event.lam):
+                raise _Refusal(f"links: rows 0..{spec.rows - 1}, {spec.cols - 1} links of 0 to lam_max")
         elif isinstance(event, Envelope):
             if event.channel >= spec.channels or not event.fits(spec.full_volts):
                 pieces = f"1 point or 4 over 1 to {LONGEST_PIECE} samples"
@@ -277,7 +295,8 @@ class VirtualController:
         if total != announced or (not self.playout.parametric and total != self.playout.received):
             raise _Refusal(f"the end at sample {total}, where {self.playout.received} of {announced} are here")
         self.playout.end(total)
-        if self._recorder is not None:
+        # What the controller draws itself is complete when it has gone out.
+        if self._recorder is not None and not self._drawing:
             self._recorder.end()
 
     def _capabilities(self) -> Capabilities:
@@ -308,6 +327,7 @@ class VirtualController:
 def _event(packet: Packet) -> Event:
     kinds: dict[Kind, type[Event]] = {
         Kind.COUPLING: LinkCoupling,
+        Kind.LINKS_TO: Links,
         Kind.BIAS: Bias,
         Kind.TONES: Tones,
         Kind.MARK: Mark,

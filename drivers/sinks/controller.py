@@ -10,6 +10,8 @@ from typing import Any
 from planner import FramePlan, Measured
 
 from ..formats.samples import SampleReader
+from ..packs.opened import PackSession
+from ..packs.sounding import PackSamples
 from ..protocol.host_session import HostSession, StreamReport, Timing
 from ..protocol.outgoing import Message, session_messages
 from ..protocol.parametric import ENVELOPES_SINCE, NotParametric, ParametricSession
@@ -67,7 +69,7 @@ class Controller:
         if not self.port:
             raise SinkError("controller: give its port, as in controller:/dev/ttyACM0; `dotwave ports` lists ports")
         number = random.SystemRandom().randrange(1, 1 << 32)
-        drawn = self.parametric and self.frames is None
+        drawn = (self.parametric or isinstance(samples, PackSamples)) and self.frames is None
         way = _Way.of(manifest, samples) if drawn else _Way(manifest, samples)
         session = HostSession(
             lambda found: self._messages(way, found, number), session=number,
@@ -101,12 +103,14 @@ class _Way:
 
     manifest: Manifest
     samples: SampleReader
-    drawn: ParametricSession | None = None
+    drawn: ParametricSession | PackSession | None = None
     why: str = ""
 
     @classmethod
     def of(cls, manifest: Manifest, samples: SampleReader) -> _Way:
-        """Drawn, if that can be."""
+        """Drawn, if that can be; what is in a pack can."""
+        if isinstance(samples, PackSamples):
+            return cls(manifest, samples, PackSession(manifest, samples))
         try:
             return cls(manifest, samples, ParametricSession.of(manifest, samples))
         except NotParametric as refusal:
@@ -123,7 +127,7 @@ class _Way:
     def notes(self, stream: StreamReport) -> tuple[str, ...]:
         """What to know of it."""
         if self.drawn is not None:
-            return (f"The controller drew it from {len(self.drawn.envelopes)} envelopes; no samples were sent.",)
+            return (f"The controller drew it from {self.drawn.pieces} envelopes; no samples were sent.",)
         rounding = f"off by at most {1e3 * self.manifest.device.amplifier.volts / 65534:.2f} mV"
         streamed = (f"It was streamed: {self.why}.",) if self.why else ()
         return (*streamed, f"Samples went out in 16 bits: {rounding}.", *buffer_notes(stream))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chainsim import Device
 from planner import FramePlan, OperatingPoint, Ramp, links_at
 
-__all__ = ["CouplingEvent", "CouplingWriter", "LamTrack"]
+__all__ = ["CouplingEvent", "CouplingWriter", "LamTrack", "on_samples"]
 
 Floats = NDArray[np.float64]
 
@@ -52,10 +52,16 @@ class CouplingEvent:
 
 
 class CouplingWriter:
-    """Turns frames, in order, into the events that change something."""
+    """Turns frames, in order, into the events that change something.
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
+    Parameters
+    ----------
+    sampled : for what changes links with samples only: a node between two of them is moved along the course to the
+        nearer one, so that only its corner is a little beside. A chain magnifies what is left of that.
+    """
+
+    def __init__(self, device: Device, *, sampled: bool = False) -> None:
+        self._device, self._sampled = device, sampled
         self._current: list[tuple[float, ...] | None] = [None] * device.rows
 
     def events(self, frame: FramePlan) -> list[CouplingEvent]:
@@ -69,12 +75,12 @@ class CouplingWriter:
 
     def _paths(self, frame: FramePlan) -> Iterator[_RowPath]:
         if self._device.grid:
-            yield from _RowPath.of_grid(self._device, frame.states[0], frame.ramps[0])
+            yield from _RowPath.of_grid(self._device, frame.states[0], frame.ramps[0], self._sampled)
             return
         per_row = self._device.chains_per_row
         for row in range(self._device.rows):
             chains = slice(row * per_row, (row + 1) * per_row)
-            yield _RowPath.of(self._device, frame.states[chains], frame.ramps[chains])
+            yield _RowPath.of(self._device, frame.states[chains], frame.ramps[chains], self._sampled)
 
     def _row_events(self, row: int, start_s: float, path: _RowPath) -> Iterator[CouplingEvent]:
         times = [round(start_s + t, TIME_DECIMALS) for t in path.t_s.tolist()]
@@ -107,34 +113,68 @@ class _RowPath:
     after: Floats
 
     @classmethod
-    def of(cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None]) -> _RowPath:
-        nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
-        # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
-        t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))
-        before = np.zeros((len(t_s), device.cols - 1))
-        after = np.zeros_like(before)
+    def of(
+        cls, device: Device, states: Sequence[OperatingPoint], ramps: Sequence[Ramp | None], sampled: bool
+    ) -> _RowPath:
+        t_s, at_s = _times(device, ramps, sampled)
+        links: Floats = np.zeros((3, len(t_s), device.cols - 1))
         n = device.chain_length
         for chain, (state, ramp) in enumerate(zip(states, ramps, strict=True)):
-            links = slice(chain * n, chain * n + n - 1)
-            before[:, links] = links_at(state, ramp, t_s, before=True)
-            after[:, links] = links_at(state, ramp, t_s)
-        return cls(t_s, before, after)
+            links[:, :, chain * n : chain * n + n - 1] = _around(state, ramp, t_s, at_s)
+        return cls._moved(at_s, *links)
 
     @classmethod
-    def of_grid(cls, device: Device, state: OperatingPoint, ramp: Ramp | None) -> Iterator[_RowPath]:
+    def of_grid(cls, device: Device, state: OperatingPoint, ramp: Ramp | None, sampled: bool) -> Iterator[_RowPath]:
         """The paths of all rows of a grid coupled in two dimensions."""
-        nodes = [] if ramp is None or ramp.lam_t_s is None else ramp.lam_t_s.tolist()
-        t_s = np.array(sorted({0.0, *nodes}))
-        before, after = (links_at(state, ramp, t_s, before=ahead) for ahead in (True, False))
-        along = device.rows * (device.cols - 1)
+        t_s, at_s = _times(device, [ramp], sampled)
+        links, along = _around(state, ramp, t_s, at_s), device.rows * (device.cols - 1)
+        right = links[..., :along].reshape(*links.shape[:2], device.rows, device.cols - 1)
+        down = links[..., along:].reshape(*links.shape[:2], device.rows - 1, device.cols)
+        rows = np.concatenate([right, np.pad(down, ((0, 0), (0, 0), (1, 0), (0, 0)))], axis=3)
+        for row in range(device.rows):
+            yield cls._moved(at_s, *rows[:, :, row])
 
-        def rows(links: Floats) -> Floats:
-            right = links[:, :along].reshape(len(t_s), device.rows, device.cols - 1)
-            down = links[:, along:].reshape(len(t_s), device.rows - 1, device.cols)
-            return np.concatenate([right, np.pad(down, ((0, 0), (1, 0), (0, 0)))], axis=2)
+    @classmethod
+    def _moved(cls, at_s: Floats, before: Floats, after: Floats, along: Floats) -> _RowPath:
+        """The path with its nodes at other times: along the course, except for jumps."""
+        smooth = np.all(before == after, axis=1)
+        before[smooth] = after[smooth] = along[smooth]
+        return cls(at_s, before, after)
 
-        for one, other in zip(rows(before).swapaxes(0, 1), rows(after).swapaxes(0, 1), strict=True):
-            yield cls(t_s, one, other)
+
+def _times(device: Device, ramps: Sequence[Ramp | None], sampled: bool) -> tuple[Floats, Floats]:
+    """Where the links of ramps have nodes, and where these are put."""
+    nodes = [ramp.lam_t_s for ramp in ramps if ramp is not None and ramp.lam_t_s is not None]
+    # Not np.unique: it imports numpy.ma, which takes longer than planning a short text.
+    t_s = np.array(sorted({0.0}.union(*(node.tolist() for node in nodes))))
+    return t_s, np.rint(t_s * device.amplifier.rate_hz) / device.amplifier.rate_hz if sampled else t_s
+
+
+def _around(state: OperatingPoint, ramp: Ramp | None, t_s: Floats, at_s: Floats) -> Floats:
+    """Links before and after the nodes `t_s`, and at `at_s`: float64, shape (3, K, links)."""
+    return np.stack([links_at(state, ramp, t_s, before=True), links_at(state, ramp, t_s), links_at(state, ramp, at_s)])
+
+
+def on_samples(events: Iterable[CouplingEvent], rate_hz: int, rows: int, cols: int) -> Iterator[CouplingEvent]:
+    """Events at samples, row by row, that keep to the same course: only its corners are a little beside.
+
+    A ramp that ends between two samples ends at the nearer one, where the course is then; before a jump, at its height.
+    """
+    of_row: list[list[CouplingEvent]] = [[] for _ in range(rows)]
+    for event in events:
+        of_row[event.row].append(event)
+    for row in of_row:
+        if not row:
+            continue
+        end_s = np.array([event.t_s + event.ramp_s for event in row])
+        near_s = np.rint(end_s * rate_hz) / rate_hz
+        along = _RowTrack.of(row, cols).at(near_s)
+        after = [(event.t_s, event.ramp_s) for event in row[1:]] + [(np.inf, 0.0)]
+        for k, (event, (next_s, ramp_s)) in enumerate(zip(row, after, strict=True)):
+            goes_on = event.ramp_s > 0 and (ramp_s > 0 or next_s > near_s[k])
+            at_s = round(event.t_s * rate_hz) / rate_hz
+            lam = tuple(along[k].tolist()) if goes_on else event.lam
+            yield CouplingEvent(at_s, event.row, lam, max(0.0, float(near_s[k]) - at_s))
 
 
 class LamTrack:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from planner import FramePlan, Plan
 
 from ..channels import channels_of
-from ..errors import UnreadableWaveform
+from ..errors import FileError, UnreadableWaveform
 from ..files.parts import Belongs
 from ..files.whole import atomic_files, check_plain, naming, settled
 from ..formats.samples import SampleReader, open_samples, writer_for
-from ..formats.table import SUFFIXES, check_suffix
+from ..formats.table import FORMATS, PACK_SUFFIX, SUFFIXES, check_suffix
 from ..formats.wav import Encoding
 from .limits import LimitCheck
 from .manifest import Manifest, ManifestWriter, digest_of_open
@@ -118,10 +118,14 @@ def _marked(frames: Iterable[FramePlan], marks: ManifestWriter) -> Iterator[Fram
         marks.add(frame)
 
 
-def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
-    """The manifest and the samples of a written waveform, by the path of either file.
+def read_waveform(path: Path | str, icon: str | None = None) -> tuple[Manifest, SampleReader]:
+    """The manifest and the samples of a written waveform, by the path of either file; or of an entry of a pack.
 
     The samples are in volts. The digest is checked only when asked for, by `Manifest.check_digest`.
+
+    Parameters
+    ----------
+    icon : name of the entry; None for the only one.
 
     Raises
     ------
@@ -130,10 +134,15 @@ def read_waveform(path: Path | str) -> tuple[Manifest, SampleReader]:
     UnreadableWaveform
         When one of them is not what it should be, or they do not belong together.
     """
+    path = Path(path)
+    if path.suffix.lower() == PACK_SUFFIX:
+        packed: tuple[Manifest, SampleReader] = FORMATS[PACK_SUFFIX].reader_module().read_packed(path, icon)
+        return packed
+    if icon is not None:
+        raise FileError(f"{path}: only a pack ({PACK_SUFFIX}) has icons; leave out {icon!r}")
     # Imported here: whoever only writes has no manifest to check.
     from .manifest_reader import read_manifest
 
-    path = Path(path)
     manifest_path = path if path.suffix.lower() == ".json" else path.with_suffix(".json")
     settled(manifest_path, _belongs(path))
     # What was asked for is missed before what belongs to it.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -19,11 +19,11 @@ from planner import FrameWish
 from ..channels import Channel, Role
 from ..errors import UnreadableWaveform
 from ..files.whole import first_of_plain
-from ..formats.table import SUFFIXES
+from ..formats.table import PACK_SUFFIX, SUFFIXES
 from .coupling import CouplingEvent
 from .manifest import MOST_BYTES, FrameMark, HeadingMark, Manifest
 
-__all__ = ["read_manifest"]
+__all__ = ["manifest_of", "read_manifest"]
 
 # As many as an amplifier has; as many as a file of 64 bits can hold.
 MOST_HZ = 10_000_000
@@ -135,6 +135,17 @@ def read_manifest(path: Path) -> Manifest:
         raise UnreadableWaveform(f"{path}: not JSON: {error}") from None
     if not isinstance(data, dict):
         raise UnreadableWaveform(f"{path}: not a manifest: expected an object with a schema")
+    return manifest_of(path, data)
+
+
+def manifest_of(path: Path, data: Mapping[str, Any]) -> Manifest:
+    """The manifest that plain JSON types are; `path` is for messages.
+
+    Raises
+    ------
+    UnreadableWaveform
+        As `read_manifest`.
+    """
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
@@ -163,7 +174,7 @@ class _Check:
     def all(self, file: _File) -> None:
         if Path(file.samples_file).name != file.samples_file or "\0" in file.samples_file:
             self._refuse("samples_file", f"expected a name without folders, got {shown(file.samples_file)}")
-        if Path(file.samples_file).suffix.lower() not in SUFFIXES:
+        if Path(file.samples_file).suffix.lower() not in (*SUFFIXES, PACK_SUFFIX):
             wanted = f"a name that ends in {', '.join(SUFFIXES)}"
             self._refuse("samples_file", f"expected {wanted}, got {shown(file.samples_file)}")
         self._channels(file.channels)

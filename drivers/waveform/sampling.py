@@ -16,7 +16,7 @@ from ..channels import Channel, Role, channels_of
 from .shaping import Shaper
 from .timeline import stretches
 
-__all__ = ["Converter", "Waveform", "volts_of"]
+__all__ = ["Converter", "Waveform", "bias_on_ramp", "volts_of"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -219,13 +219,20 @@ def _bias(state: OperatingPoint, ramp: Ramp | None, since_s: Floats, per_volt: f
     """Put the bias volts of one chain's actuators into `out`, shape (n, S), which is zero."""
     end = _ramp_samples(ramp, since_s) if ramp is not None and ramp.bias is not None else 0
     for actuator, row in enumerate(out):
-        if end and ramp is not None and ramp.bias is not None:
-            nodes = ramp.bias[:, actuator]
-            slopes = None if ramp.bias_slope is None else ramp.bias_slope[:, actuator]
-            still = np.all(nodes == nodes[0]) and (slopes is None or not np.any(slopes))
-            row[:end] = (nodes[0] if still else curve(since_s[:end], ramp.t_s, nodes, slopes)) / per_volt
+        if end and ramp is not None:
+            row[:end] = bias_on_ramp(ramp, actuator, since_s[:end]) / per_volt
         if state.bias[actuator]:
             row[end:] = state.bias[actuator] / per_volt
+
+
+def bias_on_ramp(ramp: Ramp, actuator: int, since_s: Floats) -> Floats | float:
+    """The force of the bias of one actuator of a chain at instants of a ramp that has one, dimensionless."""
+    assert ramp.bias is not None
+    nodes = ramp.bias[:, actuator]
+    slopes = None if ramp.bias_slope is None else ramp.bias_slope[:, actuator]
+    if np.all(nodes == nodes[0]) and (slopes is None or not np.any(slopes)):
+        return float(nodes[0])
+    return curve(since_s, ramp.t_s, nodes, slopes)
 
 
 def _finished(rows: Floats) -> Floats:

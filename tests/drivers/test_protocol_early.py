@@ -52,6 +52,9 @@ class Kept:
     def samples(self, codes: np.ndarray) -> None:
         self.blocks.append(codes)
 
+    def drawn(self, volts: np.ndarray) -> None:
+        pass
+
     def event(self, event: Event) -> None:
         pass
 
@@ -230,7 +233,8 @@ def test_the_oldest_host_gets_the_oldest_ack() -> None:
         (2, 2, 62),
         (3, 3, 62),
         (4, 4, 62),
-        (5, VERSION, 62),
+        (5, 5, 62),
+        (6, VERSION, 62),
         (65535, VERSION, 62),
     ):
         controller = VirtualController(SPEC, now=0.0)

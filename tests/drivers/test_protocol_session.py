@@ -39,6 +39,9 @@ class Kept:
     def samples(self, codes: np.ndarray) -> None:
         self.blocks.append(codes)
 
+    def drawn(self, volts: np.ndarray) -> None:
+        pass
+
     def event(self, event: Event) -> None:
         self.events.append(event)
 

@@ -21,8 +21,10 @@ from dotwave.playing.emulate import emulate
 from dotwave.verification import verify
 from drivers import read_waveform, write_waveform
 from drivers.protocol.emulator import Emulator
-from drivers.protocol.messages import FULL_CODE, SamplesMessage, StartMessage
+from drivers.protocol.messages import FULL_CODE, VERSION, SamplesMessage, StartMessage
 from drivers.protocol.outgoing import End, Message, session_messages
+from drivers.protocol.packet import Kind, Packet, encode
+from drivers.protocol.parametric import ParametricSession
 from drivers.protocol.playout import ControllerSpec
 from drivers.protocol.record import ArrivalRecorder, CutShort
 from drivers.protocol.virtual_controller import VirtualController
@@ -75,6 +77,31 @@ def codes(path: Path) -> np.ndarray:
 
 def files(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_session_without_samples_is_kept_as_it_is_drawn(tmp_path: Path, sent: Path) -> None:
+    path, (manifest, reader) = tmp_path / "drawn.wav", read_waveform(sent)
+    recorder = ArrivalRecorder(DEVICE, path)
+    controller = VirtualController(ControllerSpec.of(DEVICE), now=0.0, recorder=recorder)
+    controller.receive(encode(Packet(Kind.HELLO, 0, VERSION.to_bytes(2, "little"))), 0.0)
+    session = ParametricSession.of(manifest, reader).messages(controller._capabilities(), session=7)
+    now = 0.0
+    for number, message in enumerate(session):
+        now = max(now, (getattr(message, "at", 0) / manifest.rate_hz) - 0.5)
+        controller.receive(encode(message.packet(number)), now)
+        while controller.playout.events_done + 4000 < number:
+            now += 0.01
+            controller.receive(encode(Packet(Kind.HEARTBEAT)), now)
+    assert not path.exists()
+    end = now + manifest.duration_s + 0.2
+    while now < end:
+        now += 0.02
+        controller.receive(encode(Packet(Kind.HEARTBEAT)), now)
+    assert recorder.finished == 1
+    felt = verify(path)
+    assert (felt.ok, felt.samples, felt.felt_text) == (True, manifest.samples, "one two three four five six")
+    drawn, written = (np.concatenate(list(read_waveform(one)[1].blocks(8192))) for one in (path, sent))
+    assert np.abs(drawn - written).max() <= 2e-6 * DEVICE.amplifier.volts
 
 
 @pytest.mark.parametrize("time_s", [0.01, 0.52, 1.4, 2.4])

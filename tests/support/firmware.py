@@ -98,7 +98,7 @@ def built(target: str, grid: str, options: str = "", flags: str = "") -> Path:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return out / target / (grid if target in ("posix", "given") else f"{grid}.elf")
+    return out / target / (grid if target in ("posix", "given", "read-pack") else f"{grid}.elf")
 
 
 class GivenProgram:
@@ -166,3 +166,11 @@ def _answer(read: Callable[[int], bytes], grid: Grid, links: NDArray[np.int64]) 
     if not codes:
         return Answer(sent, np.zeros((0, grid.channels), np.int16), np.zeros((0, *links.shape), np.int64))
     return Answer(sent, np.stack(codes), np.stack(all_links))
+
+
+def hear(target: str, grid: str, *words: Path | str) -> subprocess.CompletedProcess[str]:
+    """What a program of the firmware says, its reads and writes watched."""
+    program = built(target, grid, flags=SANITIZED)
+    return subprocess.run(
+        [program, *words], capture_output=True, text=True, timeout=LIMIT_S, check=False, errors="replace"
+    )

@@ -2,9 +2,12 @@
  *
  * The emulated line carries 3 to 6 kB/s, a hundredth of what USB does, so time on this board goes DW_SLOW times slower
  * than outside. What goes out while a session plays is written by semihosting to the file that the command line names.
+ * With a second word, an icon of that name is played from the pack that a loader put at PACK_AT, in its own time, and then
+ * the program ends.
  */
 #include "board.h"
 #include "controller.h"
+#include "packs.h"
 #include "semihosting.h"
 #include "start.h"
 #include "vectors.h"
@@ -18,6 +21,8 @@
 #define UART_IRQ 0
 #define VECTORS_ROOM 0x40000u
 #define LINE_ROOM 4096u
+#define PACK_AT ((const uint8_t *)0x21000000u)
+#define PACK_ROOM 0x1000000u
 
 typedef struct {
     volatile uint32_t control, value, reload, interrupt;
@@ -118,14 +123,33 @@ static void byte_came(void)
     }
 }
 
+/* Without a line, and as quickly as the core can. */
+static int play_pack(const char *name)
+{
+    dw_pack pack;
+    dw_pack_entry entry;
+    if (!dw_pack_open(&pack, PACK_AT, PACK_ROOM) || !dw_pack_whole(&pack)) return 0;
+    if (!dw_pack_find(&pack, name, (uint32_t)strlen(name), &entry) || !dw_pack_play(&pack, &entry)) return 0;
+    while (dw_pack_poll()) {
+        dw_play();
+        samples_out++;
+        keep_record();
+    }
+    keep_record();
+    return dw_pack_played();
+}
+
 void reset(void);
 void reset(void)
 {
-    const char *name;
+    char *name, *icon;
     start_memory();
     name = semihosting_words();
+    icon = strchr(name, ' ');
+    if (icon) *icon++ = 0;
     if (*name) record = semihosting_create(name);
     dw_init();
+    if (icon) semihosting_exit(play_pack(icon));
     UART0->divider = 16;
     UART0->control = 1u | 2u | 8u;
     TIMER0->reload = (uint32_t)((uint64_t)CORE_HZ * DW_SLOW / DW_RATE_HZ) - 1u;

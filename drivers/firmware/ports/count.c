@@ -45,9 +45,9 @@ static void envelope(uint32_t channel, uint64_t turns)
 
 static void begin(void)
 {
-    uint16_t codes[DW_LINKS];
+    uint32_t codes[DW_LINKS];
     dw_begin(VECTORS, 1, 1);
-    for (uint32_t i = 0; i < DW_LINKS; i++) codes[i] = (uint16_t)(60000u - i);
+    for (uint32_t i = 0; i < DW_LINKS; i++) codes[i] = (60000u - i) << 16;
     for (uint32_t row = 0; row < DW_ROWS; row++) dw_links_glide(row, 60000u, codes);
     for (uint32_t channel = 0; channel < DW_CHANNELS; channel++) {
         envelope(channel, channel < DW_DRIVES ? (uint64_t)1 << 57 : 0);

@@ -1,9 +1,10 @@
 /* A board that is a pseudo-terminal: in real time by the monotonic clock, in one thread, so that nothing needs a lock.
  *
- *     controller [--link PATH] [--record FILE]
+ *     controller [--link PATH] [--record FILE] [--output FILE] [--pack FILE --icon NAME]
  *
- * prints the name of its port. PATH becomes a symbolic link to it; FILE gets what goes out while
- * a session plays (vectors.h). Ends on SIGTERM and SIGINT.
+ * prints the name of its port. PATH becomes a symbolic link to it; the record gets what goes out while
+ * a session plays (vectors.h), the output the codes of every sample, i16 each, also while nothing plays. Ends on SIGTERM and SIGINT. With a pack there is no line: it plays one icon of it as
+ * quickly as the machine can, and ends.
  */
 #define _XOPEN_SOURCE 700
 
@@ -21,6 +22,7 @@
 #include "board.h"
 #include "config.h"
 #include "controller.h"
+#include "posix_pack.h"
 #include "vectors.h"
 
 #define STEP_MS 1
@@ -30,7 +32,7 @@
 
 static volatile sig_atomic_t ended;
 static int line;
-static FILE *record;
+static FILE *record, *output;
 static uint8_t coming[BYTES_READ], pending[BYTES_PENDING];
 static uint32_t coming_at, coming_length, pending_length;
 static uint64_t now_us, samples_out;
@@ -60,6 +62,7 @@ void board_links(uint32_t row, const uint16_t *codes)
 void board_write(const int16_t *codes)
 {
     uint8_t bytes[VECTOR_BYTES];
+    if (output && fwrite(codes, sizeof *codes, DW_CHANNELS, output) != DW_CHANNELS) ended = 1;
     if (record && vector_put(bytes, codes) && fwrite(bytes, 1, sizeof bytes, record) != sizeof bytes) ended = 1;
 }
 
@@ -124,14 +127,19 @@ static void pass_time(uint64_t *real)
     now_us = until;
 }
 
-static int run(const char *link, const char *file)
+static void sample(void)
+{
+    now_us = samples_out++ * 1000000u / DW_RATE_HZ;
+    dw_play();
+}
+
+static int run(const char *link)
 {
     const char *name = 0;
     uint64_t real = real_us();
     if (!open_line(&name) || (link && symlink(name, link))) return 0;
     printf("%s\n", link ? link : name);
     fflush(stdout);
-    if (file && !(record = fopen(file, "wb"))) return 0;
     dw_init();
     while (!ended) {
         exchange();
@@ -140,26 +148,38 @@ static int run(const char *link, const char *file)
         while (coming_at < coming_length);
     }
     if (link) unlink(link);
-    return !record || fclose(record) == 0;
+    return 1;
 }
 
 int main(int argc, char **argv)
 {
-    const char *link = 0, *file = 0;
+    static const char *const names[] = {"--link", "--record", "--output", "--pack", "--icon"};
+    const char *given[5] = {0, 0, 0, 0, 0};
     struct sigaction action;
+    int done;
     memset(&action, 0, sizeof action);
     action.sa_handler = end;
     sigaction(SIGTERM, &action, 0);
     sigaction(SIGINT, &action, 0);
     for (int i = 1; i < argc; i += 2) {
-        if (i + 1 < argc && strcmp(argv[i], "--link") == 0) link = argv[i + 1];
-        else if (i + 1 < argc && strcmp(argv[i], "--record") == 0) file = argv[i + 1];
-        else {
-            fprintf(stderr, "%s: %s: expected --link PATH or --record FILE\n", argv[0], argv[i]);
+        int k = 0;
+        while (k < 5 && strcmp(argv[i], names[k]) != 0) k++;
+        if (k == 5 || i + 1 == argc) {
+            fprintf(stderr, "%s: %s: expected --link PATH, --record FILE, --output FILE, or --pack FILE --icon NAME\n",
+                    argv[0], argv[i]);
             return 2;
         }
+        given[k] = argv[i + 1];
     }
-    if (run(link, file)) return 0;
+    done = (!given[1] || (record = fopen(given[1], "wb"))) && (!given[2] || (output = fopen(given[2], "wb")));
+    if (done && given[3]) {
+        if (!play_pack(given[3], given[4] ? given[4] : "", sample)) return 1;
+    } else if (done) {
+        done = run(given[0]);
+    }
+    if (record && fclose(record) != 0) done = 0;
+    if (output && fclose(output) != 0) done = 0;
+    if (done) return 0;
     fprintf(stderr, "%s: %s\n", argv[0], strerror(errno));
     return 1;
 }

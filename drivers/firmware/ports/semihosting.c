@@ -16,7 +16,7 @@ static uint32_t ask(uint32_t operation, const void *argument)
     return r0;
 }
 
-const char *semihosting_words(void)
+char *semihosting_words(void)
 {
     static char line[256];
     struct {
@@ -24,9 +24,9 @@ const char *semihosting_words(void)
         uint32_t size;
     } block = {line, sizeof line};
     char *words;
-    if (ask(GET_CMDLINE, &block)) return "";
+    if (ask(GET_CMDLINE, &block)) line[0] = 0;
     words = strchr(line, ' ');
-    return words ? words + 1 : "";
+    return words ? words + 1 : line + strlen(line);
 }
 
 int32_t semihosting_create(const char *name)

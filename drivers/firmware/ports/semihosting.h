@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 /* The words behind the program's name; "" when there are none. */
-const char *semihosting_words(void);
+char *semihosting_words(void);
 
 /* A file to write anew; below 0 when it cannot be. */
 int32_t semihosting_create(const char *name);

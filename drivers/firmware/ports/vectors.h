@@ -11,6 +11,7 @@
 #define VECTOR_BYTES (8u + 2u * DW_ROWS * DW_LINKS + 2u * DW_CHANNELS)
 
 static uint16_t vector_links[DW_ROWS][DW_LINKS];
+static uint64_t vector_played;
 
 /* For board_links. */
 static inline void vector_keep(uint32_t row, const uint16_t *codes)
@@ -18,11 +19,13 @@ static inline void vector_keep(uint32_t row, const uint16_t *codes)
     memcpy(vector_links[row], codes, sizeof vector_links[row]);
 }
 
-/* For board_write; 0 while nothing plays. */
+/* For board_write; 0 while nothing plays, and with the last zero before it goes on. */
 static inline int vector_put(uint8_t *bytes, const int16_t *codes)
 {
     uint8_t *p = bytes + 8;
-    if (dw_out.state != DW_PLAYING) return 0;
+    int moved = dw_out.played != vector_played;
+    vector_played = dw_out.played;
+    if (!moved || dw_out.state != DW_PLAYING) return 0;
     dw_put64(bytes, dw_out.played - 1u);
     for (uint32_t row = 0; row < DW_ROWS; row++)
         for (uint32_t i = 0; i < DW_LINKS; i++, p += 2) dw_put16(p, vector_links[row][i]);

@@ -84,3 +84,39 @@ def test_render_and_schema(dotwave: Callable[..., Any], tmp_path: Path) -> None:
     assert f"Written: {out}" in ended.out
     assert "Hello" in dotwave("verify", out).out
     assert json.loads(dotwave("schema").out)["title"] == "Job"
+
+
+def test_a_set_of_icons_becomes_a_pack(dotwave: Callable[..., Any], tmp_path: Path) -> None:
+    folder, pack = tmp_path / "set", tmp_path / "icons.dwp"
+    (folder / "more").mkdir(parents=True)
+    for name in ("heart.svg", "lock.svg", "more/lock.svg", "paper-plane_2.svg"):
+        shutil.copy(HEART, folder / name)
+    made = dotwave("icons", folder, "-o", tmp_path / "out", "--workers", 1, "--pack", pack, "--json")
+    report = json.loads(made.out)
+    assert made.code == 0
+    assert report["files"][-1] == str(pack)
+    assert report["reached"] == [f"Pack: 4 icons in {pack.stat().st_size} bytes."]
+    from drivers import Pack
+
+    opened = Pack(pack)
+    assert sorted(opened.names()) == ["heart", "lock.svg", "more/lock.svg", "paper-plane_2"]
+    assert opened.find("paper-plane_2").spoken == "paper plane 2"
+    felt = dotwave("verify", pack, "--icon", "heart", "--json")
+    assert (felt.code, json.loads(felt.out)["wrong_dots"]) == (0, 0)
+    for given, why in (
+        (["verify", pack, "--icon", "hart"], "it has no 'hart'; like it: heart"),
+        (["play", pack], "it has 4 icons; name one with --icon"),
+        (["verify", folder / "heart.svg", "--icon", "heart"], "only a pack (.dwp) has icons"),
+        (
+            ["icons", folder, "-o", tmp_path / "two", "--pack", tmp_path / "icons.zip"],
+            "expected a name that ends in .dwp",
+        ),
+    ):
+        refused = dotwave(*given)
+        assert (refused.code, refused.err.count("\n")) == (2, 1)
+        assert why in refused.err
+    assert not (tmp_path / "two").exists()
+    drawn = dotwave("preview", pack, "--icon", "heart", "-o", tmp_path / "heart")
+    assert (drawn.code, (tmp_path / "heart.png").is_file()) == (0, True)
+    played = dotwave("play", pack, "--icon", "heart", "--json")
+    assert (played.code, json.loads(played.out)["live"]) == (0, False)

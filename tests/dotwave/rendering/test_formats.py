@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from drivers import FORMATS, SUFFIXES, read_exchange, read_waveform
+from drivers import FORMATS, PACK_SUFFIX, SUFFIXES, read_exchange, read_waveform
 from encoders.braille import text as encoder
 from planner import plan_scene
 
@@ -45,6 +45,9 @@ def test_whatever_is_shown_is_written_in_every_format(dotwave, calls, tmp_path: 
         assert report["files"] == [str(out), str(out.with_suffix(".json"))]
         assert reader.samples / reader.rate_hz == pytest.approx(report["duration_s"], abs=1e-3)
         manifest.check_digest(out)
+    elif suffix == PACK_SUFFIX:
+        assert report["files"] == [str(out)]
+        assert read_waveform(out)[0].duration_s == pytest.approx(report["duration_s"], abs=1e-3)
     else:
         assert report["files"] == [str(out)]
         assert read_exchange(out).time_s[-1] == pytest.approx(report["duration_s"], abs=1e-3)

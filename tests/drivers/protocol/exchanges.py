@@ -11,7 +11,7 @@ import numpy as np
 from drivers.protocol.envelope import LONGEST_PIECE, Envelope
 from drivers.protocol.keys import GridKey, KeyEvent, keyed
 from drivers.protocol.measured import Measure, turns_of
-from drivers.protocol.messages import Bias, LinkCoupling, Mark, SamplesMessage, StartMessage, Tones, WireTone
+from drivers.protocol.messages import Bias, LinkCoupling, Links, Mark, SamplesMessage, StartMessage, Tones, WireTone
 from drivers.protocol.outgoing import End
 from drivers.protocol.packet import Kind, Packet, encode
 from tests.support.firmware import Request
@@ -75,7 +75,7 @@ def cut(block: np.ndarray, first: int = 0) -> list[SamplesMessage]:
 
 def greeting() -> Talk:
     talk = Talk(None).say(STATUS).say(BEAT, wait_ms=3)
-    for version in (0, 1, 2, 3, 4, 5, 256, 65535):
+    for version in (0, 1, 2, 3, 4, 5, 6, 256, 65535):
         talk.say(hello(version), STATUS, wait_ms=5)
     return talk
 
@@ -180,6 +180,15 @@ def links() -> Talk:
         LinkCoupling(120, 0, 1, (7, 8)), LinkCoupling(500, 0, 700, (60000, 12345)), End(1600), wait_ms=1,
     )  # fmt: skip
     return talk.beat(150).say(STOP, wait_ms=5).beat(40)
+
+
+def finer_links() -> Talk:
+    talk = Talk(6).start(1600, parametric=True)
+    talk.order(
+        Links(0, 0, 0, (0.123456789, 1.0)), Links(0, 1, 300, (1.0, 1e-6)), LinkCoupling(400, 1, 100, (0, 65535)),
+        Links(450, 1, 70, (0.3333333, 0.0)), Links(700, 0, 800, (1e-9, 0.7)), End(1600), wait_ms=1,
+    )  # fmt: skip
+    return talk.beat(250)
 
 
 def biases() -> Talk:
@@ -295,6 +304,11 @@ REFUSALS: dict[str, Callable[[], Talk]] = {
     "an event in the past": refused(Mark(99, 1), before=(Mark(100, 0),)),
     "a row that is not there": refused(LinkCoupling(0, 2, 0, (0, 0))),
     "too few links": refused(LinkCoupling(0, 0, 0, (0,))),
+    "finer links over lam_max": refused(Links(0, 0, 0, (0.5, 1.1))),
+    "finer links below zero": refused(Links(0, 0, 0, (0.5, -1e-3))),
+    "finer links that are no number": refused(Links(0, 0, 0, (math.nan, 0.5))),
+    "finer links of no row": refused(Links(0, 2, 0, (0.5, 0.5))),
+    "too many finer links": refused(Links(0, 0, 0, (0.5, 0.5, 0.5))),
     "a bias over full volts": refused(Bias(0, 0, 0, 100.5)),
     "a bias that is no number": refused(Bias(0, 0, 0, math.nan)),
     "a channel that is not there": refused(Bias(0, 2, 0, 1.0)),
@@ -315,7 +329,8 @@ REFUSALS: dict[str, Callable[[], Talk]] = {
 EXCHANGES: dict[str, Callable[[], Talk]] = {
     "greeting": greeting, "spoiled frames": spoiled_frames, "samples": samples, "early": early,
     "early for version 1": early_for_version_1, "too early": too_early, "starts": starts, "wrong rate": wrong_rate,
-    "marks": marks, "too many events": too_many_events, "links": links, "biases": biases, "tones": tones,
+    "marks": marks, "too many events": too_many_events, "links": links, "finer links": finer_links,
+    "biases": biases, "tones": tones,
     "envelopes": envelopes, "silence": silence, "silence of tones": silence_of_tones, "underrun": underrun,
     "late end": late_end, "open session": open_session, "open parametric session": open_parametric_session,
     "prefill that is not there": prefill_that_is_not_there, "keys": keys, "stop": stop,

@@ -126,8 +126,15 @@ def test_the_static_check_is_clean() -> None:
     assert done.returncode == 0, done.stderr
 
 
-COMMON = (Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE, Kind.MARK)
-ITEMS = {Kind.COUPLING: (2,), Kind.TONES: (0, 1, 2), Kind.ENVELOPE: (1, 4), Kind.SAMPLES: (20, 200), Kind.KEY: (3,)}
+COMMON = (Kind.SAMPLES, Kind.COUPLING, Kind.BIAS, Kind.TONES, Kind.ENVELOPE, Kind.MARK, Kind.LINKS_TO)
+ITEMS = {
+    Kind.COUPLING: (2,),
+    Kind.LINKS_TO: (2,),
+    Kind.TONES: (0, 1, 2),
+    Kind.ENVELOPE: (1, 4),
+    Kind.SAMPLES: (20, 200),
+    Kind.KEY: (3,),
+}
 EXTREMES = [0, 1, 2, 7, 40, 4096, 65535, 65536, 1 << 31, (1 << 32) - 1]
 
 
