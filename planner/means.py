@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -41,6 +42,20 @@ class Means:
     @cached_property
     def _steps(self) -> ChainSteps:
         return ChainSteps(self.memory)
+
+    def through(self, frames: Iterable[Frame]) -> Iterator[tuple[Frame, Change]]:
+        """Frames one after another, from rest, and the change to each.
+
+        What cannot be held is not played, and the frame after it begins at rest.
+        """
+        if self.dots is None:
+            yield from self._steps.through(frames)
+            return
+        held = self.memory.at_rest
+        for frame in frames:
+            change = self.change(held, frame)
+            yield frame, change
+            held = change.targets if change.held else self.memory.at_rest
 
     def change(self, before: list[ChainTarget], frame: Frame) -> Change:
         """The change from what chains hold to a frame.

@@ -110,9 +110,7 @@ class _Frames:
         targets = memory.at_rest
         position = 0
         self._following = None
-        for frame in self._scene.frames:
-            change = means.change(targets, frame)
-            # What cannot be held is not played, and the next frame begins at rest.
+        for frame, change in means.through(self._scene.frames):
             targets = change.targets if change.held else memory.at_rest
             samples = max(1, round(frame.dwell_s * rate))
             yield self._frame(frame, position, samples, change)
