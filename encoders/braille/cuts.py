@@ -198,6 +198,8 @@ class Cutter:
 
 def _lettered(text: str) -> bool:
     """Whether a word has letters only, apart from signs around it."""
+    if text.isalpha():
+        return True
     first = next((at for at, char in enumerate(text) if char.isalnum()), 0)
     last = next((at for at in range(len(text) - 1, -1, -1) if text[at].isalnum() or extends(text[at])), -1)
     core = text[first : last + 1]

@@ -201,17 +201,23 @@ class _Filler:
     def end_page(self) -> None:
         """The page as it is, if there is anything on it."""
         runs, layout = self.done, self.layout
-        shown = [run for run in runs if run.start >= 0]
         self.done = []
-        if not shown and (layout.lined or not runs):
+        cells, start, last = "", -1, None
+        goes_on: list[GoesOn] = []
+        cuts: list[tuple[PlacedWord, Cut]] = []
+        for number, run in enumerate(runs):
+            cells += run.cells or BLANK * layout.run
+            if run.start >= 0:
+                start, last = run.start if start < 0 else start, run
+            if run.cut is not None:
+                _, cut = run.cut
+                goes_on.append(GoesOn(number, cut.mark, cut.restated, cut.ending, cut.left_out))
+                cuts.append(run.cut)
+        if last is None and (layout.lined or not runs):
             return
-        last = shown[-1] if shown else runs[-1]
-        start = shown[0].start if shown else last.end
-        cells = "".join([run.cells or BLANK * layout.run for run in runs]).ljust(layout.capacity, BLANK)
-        cuts = [(number, *run.cut) for number, run in enumerate(runs) if run.cut is not None]
-        goes_on = [GoesOn(number, cut.mark, cut.restated, cut.ending, cut.left_out) for number, _, cut in cuts]
-        parted = tuple([(word, cut) for _, word, cut in cuts])
-        page = Page(cells, start, last.end, last.ends_block, last.ends_paragraph, tuple(goes_on), None, parted)
+        last = last or runs[-1]
+        start, cells = start if start >= 0 else last.end, cells.ljust(layout.capacity, BLANK)
+        page = Page(cells, start, last.end, last.ends_block, last.ends_paragraph, tuple(goes_on), None, tuple(cuts))
         self.made.append(self._with_number(page))
         self._page_number += 1 + (self._blanks and last.ends_paragraph)
         if self._numbered is not None:

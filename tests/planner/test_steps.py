@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,18 +110,24 @@ def test_what_is_planned_ahead_is_what_one_change_after_another_gives(
         assert replace(change, states=(), ramps=()) == replace(alone, states=(), ramps=())
         assert [packed(state) for state in change.states] == [packed(state) for state in alone.states]
         for ramp, same in zip(change.ramps, alone.ramps, strict=True):
-            assert (ramp is None) == (same is None)
-            if ramp is not None:
-                # What rings on is a difference of two large numbers.
-                assert packed(replace(ramp, residue=None)) == packed(replace(same, residue=None))
-                assert (ramp.residue is None) or ramp.residue == pytest.approx(same.residue, abs=1e-12)
+            if ramp is None or same is None:
+                assert ramp is same
+                continue
+            # What rings on is a difference of two large numbers.
+            assert packed(replace(ramp, residue=None)) == packed(replace(same, residue=None))
+            assert ramp.residue is None or ramp.residue == pytest.approx(same.residue, abs=1e-12)
         held = alone.targets if alone.held else memory.at_rest
 
 
 def test_what_many_frames_bring_is_kept_in_few_transactions(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    monkeypatch.setattr(CacheFile, "find", lambda self, keys: asked.append(len(keys)) or {})
-    monkeypatch.setattr(CacheFile, "keep", lambda self, rows: asked.append(sum(1 for _ in rows)))
+
+    def find(_: CacheFile, keys: Sequence[bytes]) -> dict[bytes, bytes]:
+        asked.append(len(keys))
+        return {}
+
+    monkeypatch.setattr(CacheFile, "find", find)
+    monkeypatch.setattr(CacheFile, "keep", lambda _, rows: asked.append(sum(1 for _ in rows)))
     frames = tuple(Frame(dots(seed), 1.0) for seed in range(256))
     plan = plan_scene(Scene(GridShape(6, 6), frames), PAPER)
     assert sum(1 for _ in plan.frames) == 257
