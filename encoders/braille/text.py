@@ -224,8 +224,7 @@ class TextFrames:
             return
         kept: list[Frame] = []
         most = MOST_KEPT // (self.layout.shape.rows * self.layout.shape.cols)
-        frames = self._encoded()
-        for frame in frames:
+        for frame in (frames := self._encoded()):
             yield frame
             kept.append(frame)
             if len(kept) > most:
