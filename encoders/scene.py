@@ -99,6 +99,12 @@ class TargetPattern:
     any_phase: NDArray[np.bool_] | None = None
     unlocked: UnlockedBeats | None = None
 
+    @property
+    def plain(self) -> bool:
+        """Whether its amplitudes say all of it."""
+        moves = self.walking is not None or self.unlocked is not None
+        return not (self.phase_matters or moves) and self.weight is None
+
 
 @dataclass(frozen=True, slots=True)
 class GoesOn:

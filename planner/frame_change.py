@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from chainsim import Outcome
-from encoders import TargetPattern
+from encoders import Frame, TargetPattern
 
-from .memory import Memory
+from .memory import Ends, Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
 from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 
-__all__ = ["USUAL", "ChainSteps", "Change", "Pace", "change_to", "moves_between"]
+__all__ = ["USUAL", "ChainSteps", "Change", "Pace", "change_to", "moves_between", "usual"]
 
 # All of 64 x 64 of a chain of six, which may be held in two ways, would fit.
 MOST_STEPS = 1 << 14
+# Chains of frames that are read ahead: 64 frames of six.
+MOST_AHEAD = 384
 
 
 class Pace(NamedTuple):
@@ -37,6 +40,11 @@ class Pace(NamedTuple):
 
 
 USUAL = Pace()
+
+
+def usual(frame: Frame) -> Pace:
+    """The pace of a frame of which nothing else is asked."""
+    return USUAL
 
 
 @dataclass(frozen=True)
@@ -178,10 +186,18 @@ def _all_alike(memory: Memory, before: list[ChainTarget], change: Change, moves:
     return Change.of(change.targets, states, ramps)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Held:
+    """What a chain of a kind holds; one object for each, so that it is found by what it is."""
+
+    kind: int
+    target: ChainTarget
+
+
 class _Step(NamedTuple):
     """What one chain holds after a change, and its way there."""
 
-    target: ChainTarget
+    held: _Held
     state: OperatingPoint
     ramp: Ramp | None
     duration_s: float
@@ -202,34 +218,102 @@ class ChainSteps:
         self._memory = memory
         self._kinds = memory.kinds_at
         self._apart = device.coupling.scope != "device" and device.drive != "device"
-        self._known: dict[Pace, dict[tuple[int, ChainTarget, ChainTarget], _Step]] = {}
+        self._chains: dict[tuple[int, ChainTarget], _Held] = {}
+        self._known: dict[Pace, dict[tuple[_Held, ChainTarget | bytes], _Step]] = {}
 
     def change(
         self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None = None, pace: Pace = USUAL
     ) -> Change:
         """The change from what chains hold to a pattern; `dots` as in `targets_of`."""
-        wanted, known = targets_of(pattern, self._memory.device, dots), self._known.setdefault(pace, {})
-        try:
-            steps = [known[step] for step in zip(self._kinds, before, wanted, strict=True)]
-        except KeyError:
-            held = self._memory.hold(pattern, before, dots, pace.awake)
-            change = change_to(self._memory, before, held, pace.length_s)
-            if self._apart and change.made:
-                self._remember(known, before, wanted, change)
-            return change
-        targets, states, ramps, durations_s, rings = zip(*steps, strict=True)
-        return Change(list(targets), states, ramps, max(durations_s), True, "", any(rings))
+        steps = self._steps(self._held(before), pattern, dots, pace)
+        return self._made(before, pattern, dots, pace) if steps is None else _joined(steps)
 
-    def _remember(
-        self,
-        known: dict[tuple[int, ChainTarget, ChainTarget], _Step],
-        before: Sequence[ChainTarget],
-        wanted: Sequence[ChainTarget],
-        change: Change,
-    ) -> None:
-        if len(known) >= MOST_STEPS:
-            known.clear()
-        ends = zip(self._kinds, before, wanted, strict=True)
-        for ask, target, state, ramp in zip(ends, change.targets, change.states, change.ramps, strict=True):
-            duration_s, rings = (0.0, False) if ramp is None else (ramp.duration_s, ramp.residue is not None)
-            known[ask] = _Step(target, state, ramp, duration_s, rings)
+    def through(
+        self, frames: Iterable[Frame], pace_of: Callable[[Frame], Pace] = usual
+    ) -> Iterator[tuple[Frame, Change]]:
+        """Frames one after another, from rest, and the change to each; what some of them bring is planned at once.
+
+        What cannot be held is not played, and the frame after it begins at rest.
+        """
+        held = self._held(self._memory.at_rest)
+        left, size = iter(frames), 1
+        while some := [(frame, pace_of(frame)) for frame in islice(left, size)]:
+            planned = False
+            for place, (frame, pace) in enumerate(some):
+                steps = self._steps(held, frame.pattern, None, pace)
+                if steps is not None:
+                    held = [step.held for step in steps]
+                    yield frame, _joined(steps)
+                    continue
+                if not planned:
+                    self._plan(held, some[place:])
+                    planned = True
+                change = self._made([chain.target for chain in held], frame.pattern, None, pace)
+                yield frame, change
+                held = self._held(change.targets if change.held else self._memory.at_rest)
+            # The first frames are not waited for long.
+            size = min(2 * size, max(1, MOST_AHEAD // len(self._kinds)))
+
+    def _held(self, targets: Iterable[ChainTarget]) -> list[_Held]:
+        chains = self._chains
+        if max(len(chains), sum(map(len, self._known.values()))) >= MOST_STEPS:
+            chains.clear()
+            self._known.clear()
+        return [
+            chains.get(chain) or chains.setdefault(chain, _Held(*chain))
+            for chain in zip(self._kinds, targets, strict=True)
+        ]
+
+    def _steps(
+        self, held: Sequence[_Held], pattern: TargetPattern, dots: DotGoal | None, pace: Pace
+    ) -> list[_Step] | None:
+        """What every chain did before for a pattern; None where one has yet to do it."""
+        known = self._known.setdefault(pace, {})
+        try:
+            return [known[step] for step in zip(held, self._wishes(pattern, dots), strict=True)]
+        except KeyError:
+            return None
+
+    def _wishes(self, pattern: TargetPattern, dots: DotGoal | None) -> Sequence[ChainTarget | bytes]:
+        """What tells one wish for a chain from another: of plain patterns their bytes, which is quicker."""
+        if dots is not None or not pattern.plain:
+            return targets_of(pattern, self._memory.device, dots)
+        raw = pattern.amplitude.tobytes()
+        size = len(raw) // len(self._kinds)
+        return [raw[at : at + size] for at in range(0, len(raw), size)]
+
+    def _plan(self, held: Sequence[_Held], frames: Sequence[tuple[Frame, Pace]]) -> None:
+        """Plan the ways that frames one after another bring and that are new."""
+        if not self._apart:
+            return
+        memory, new = self._memory, defaultdict[float | None, list[Ends]](list)
+        for frame, pace in frames:
+            steps = self._steps(held, frame.pattern, None, pace)
+            if steps is not None:
+                held = [step.held for step in steps]
+                continue
+            before = [chain.target for chain in held]
+            after = memory.hold(frame.pattern, before, awake=pace.awake)
+            new[pace.length_s].append((before, after))
+            held = self._held(after)
+        for length_s, changes in new.items():
+            memory.prepare_ways(changes, moves_between(memory, [], []), length_s)
+
+    def _made(self, before: list[ChainTarget], pattern: TargetPattern, dots: DotGoal | None, pace: Pace) -> Change:
+        """The change worked out."""
+        after = self._memory.hold(pattern, before, dots, pace.awake)
+        change = change_to(self._memory, before, after, pace.length_s)
+        if self._apart and change.made:
+            ends = zip(self._held(before), self._wishes(pattern, dots), strict=True)
+            chains = zip(ends, self._held(change.targets), change.states, change.ramps, strict=True)
+            known = self._known.setdefault(pace, {})
+            for ask, held, state, ramp in chains:
+                duration_s, rings = (0.0, False) if ramp is None else (ramp.duration_s, ramp.residue is not None)
+                known[ask] = _Step(held, state, ramp, duration_s, rings)
+        return change
+
+
+def _joined(steps: Sequence[_Step]) -> Change:
+    """The change that chains make together."""
+    held, states, ramps, durations_s, rings = zip(*steps, strict=True)
+    return Change([chain.target for chain in held], states, ramps, max(durations_s), True, "", any(rings))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 from chainsim import Device
 from encoders import Frame
 
-from .frame_change import USUAL, ChainSteps, Change, Pace
+from .frame_change import USUAL, ChainSteps, Change, Pace, usual
 from .memory import Memory
 from .targets import AS_WISHED, ChainTarget, DotGoal
 from .wish import FrameWish
@@ -41,6 +42,22 @@ class Means:
     @cached_property
     def _steps(self) -> ChainSteps:
         return ChainSteps(self.memory)
+
+    def through(
+        self, frames: Iterable[Frame], pace_of: Callable[[Frame], Pace] = usual
+    ) -> Iterator[tuple[Frame, Change]]:
+        """Frames one after another, from rest, and the change to each.
+
+        What cannot be held is not played, and the frame after it begins at rest.
+        """
+        if self.dots is None:
+            yield from self._steps.through(frames, pace_of)
+            return
+        held = self.memory.at_rest
+        for frame in frames:
+            change = self.change(held, frame, pace_of(frame))
+            yield frame, change
+            held = change.targets if change.held else self.memory.at_rest
 
     def change(self, before: list[ChainTarget], frame: Frame, pace: Pace = USUAL) -> Change:
         """The change from what chains hold to a frame.

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from chainsim import Device
+from chainsim import Device, Outcome
 from encoders import TargetPattern
 
 from .cache import PlanCache
@@ -17,10 +17,12 @@ from .planner import Planner, Transition
 from .targets import AmplitudeTarget, ChainTarget, DotGoal, targets_of
 from .transitions.joining import turned_ramp, turned_state
 
-__all__ = ["Memory"]
+__all__ = ["Ends", "Memory"]
 
 # Kept of each: all 64 x 64 ramps of a chain of six would fit.
 MOST_RAMPS = MOST_STATES = 4096
+Ends = tuple[Sequence[ChainTarget], Sequence[ChainTarget]]
+"""What chains hold before a change and after it."""
 
 
 class Memory:
@@ -164,6 +166,13 @@ class Memory:
         leave = Ramp(t_s=np.zeros(1)) if before.resting else self._ramp(before, self.rest, moves, 0.0)
         enter = self._ramp(self.rest, after, moves, 0.0)
         return self.planner.by_rest(leave, enter, self.state(before), self.state(after), wait_s)
+
+    def prepare_ways(self, changes: Iterable[Ends], moves: bool, length_s: float | None = None) -> None:
+        """Plan the ramps of many changes at once, which is quicker than one by one."""
+        pairs = dict.fromkeys(pair for before, after in changes for pair in zip(before, after, strict=True))
+        # Between what cannot be held no ways are looked for.
+        lasting = {target for pair in pairs for target in pair if self.state(target).outcome is Outcome.OK}
+        self.prepare_ramps((pair for pair in pairs if lasting.issuperset(pair)), moves, length_s)
 
     def prepare_ramps(
         self, pairs: Iterable[tuple[ChainTarget, ChainTarget]], moves: bool, length_s: float | None = None

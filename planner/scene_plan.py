@@ -116,9 +116,8 @@ class _Frames:
         targets = memory.at_rest
         position = 0
         self._following = None
-        for frame in self._scene.frames:
+        for frame, change in means.through(self._scene.frames, self._pace):
             samples = max(1, round(frame.dwell_s * rate))
-            change = means.change(targets, frame, self._pace(frame, samples / rate))
             # What cannot be held is not played, and the next frame begins at rest.
             targets = change.targets if change.held else memory.at_rest
             yield self._frame(frame, position, samples, change)
@@ -129,7 +128,7 @@ class _Frames:
         if any(ramp is not None for ramp in change.ramps):
             yield self._frame(None, position, int(change.longest_s * rate) + 2, change)
 
-    def _pace(self, frame: Frame, length_s: float) -> Pace:
+    def _pace(self, frame: Frame) -> Pace:
         """How chains go to a frame; raises where it travels and they cannot, or not as quickly."""
         if not (frame.travels or frame.leads):
             return USUAL
@@ -140,6 +139,8 @@ class _Frames:
             raise CannotTravel(cannot_travel(self._device))
         if not frame.travels:
             return Pace(awake=True)
+        rate = self._device.amplifier.rate_hz
+        length_s = max(1, round(frame.dwell_s * rate)) / rate
         if length_s < family.shortest_s:
             most = math.floor(100 / family.shortest_s) / 100
             raise DwellTooShort(

@@ -103,7 +103,7 @@ class ChainTarget:
         """The same, with a lam that other chains give; amplitudes at will are made with any."""
         return self
 
-    @property
+    @cached_property
     def key(self) -> bytes:
         """The target in bytes, for a cache on disk."""
         return repr(self).encode()
@@ -127,10 +127,10 @@ class AmplitudeTarget(ChainTarget):
         """Of amplitudes in an array of shape (n,); rest is rest, whatever it is for."""
         return _amplitude(levels.tobytes(), turn, dots)
 
-    @property
+    @cached_property
     def key(self) -> bytes:
         """The target in bytes, for a cache on disk."""
-        return super().key + (b"" if self.dots is None else repr(self.dots).encode())
+        return repr(self).encode() + (b"" if self.dots is None else repr(self.dots).encode())
 
 
 @dataclass(frozen=True)

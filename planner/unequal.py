@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chainsim import Device, Outcome
 from encoders import TargetPattern
 
-from .memory import MOST_STATES, Memory
+from .memory import MOST_STATES, Ends, Memory
 from .operating_point import OperatingPoint
 from .plan import Ramp
 from .targets import ChainTarget, DotGoal, targets_of
@@ -71,6 +71,13 @@ class UnequalMemory(Memory):
         for kind, memory in enumerate(self._of_kind):
             memory.prepare(target for target, at in zip(targets, self._kind_at, strict=True) if at == kind)
         return targets
+
+    def prepare_ways(self, changes: Iterable[Ends], moves: bool, length_s: float | None = None) -> None:
+        """Plan the ramps of many changes at once."""
+        given = list(changes)
+        for kind, memory in enumerate(self._of_kind):
+            places = [place for place, at in enumerate(self._kind_at) if at == kind]
+            memory.prepare_ways([([b[i] for i in places], [a[i] for i in places]) for b, a in given], moves, length_s)
 
     def states(self, targets: Sequence[ChainTarget]) -> list[OperatingPoint]:
         """The states for what chains hold, as the device is set to them."""

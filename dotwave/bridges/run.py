@@ -58,7 +58,7 @@ class LiveOptions:
 
     Attributes
     ----------
-    to : ``controller:PORT``, ``audio:CARD``, or none.
+    to : ``controller:PORT``, or none.
     show : write what is felt to the terminal.
     record : where the session is kept; None for nowhere.
     table : of the characters; None for the source's own.

@@ -32,7 +32,7 @@ class CursorShown(StrEnum):
     NONE = "none"
 
 
-To = Annotated[str, typer.Option(metavar="SINK", help="controller:PORT, audio:CARD or none.")]
+To = Annotated[str, typer.Option(metavar="SINK", help="controller:PORT or none.")]
 Show = Annotated[bool, typer.Option("--show", help="Write what is felt to the terminal, a line a change.")]
 Record = Annotated[Path | None, typer.Option("--record", "-o", help="A .jsonl for what comes and goes.")]
 

@@ -275,7 +275,10 @@ class Live:
         if name == "none":
             controller = VirtualController(ControllerSpec.of(self.device), now=self._clock(), name="nobody")
             return lambda: LoopLine(controller, self._clock)
-        raise AppError(f"{sink}: expected controller:PORT or none: to play live, such as controller:/dev/ttyACM0")
+        files = "; a sound card plays written files (dotwave play OUT --audio CARD)" if name == "audio" else ""
+        raise AppError(
+            f"{sink}: expected controller:PORT or none: to play live, such as controller:/dev/ttyACM0{files}"
+        )
 
     def _play(self, first: list[SerialLine]) -> None:
         def line() -> SerialLine:

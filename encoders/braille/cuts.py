@@ -24,6 +24,7 @@ fakoo.de/braille-zahlen.html).
 from __future__ import annotations
 
 import os
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
@@ -49,6 +50,7 @@ REMEMBERED = 1 << 14
 
 _HYPHENS = "-\u2010\u2011"
 _SEPARATORS = _HYPHENS + "/\\.,:;@_+=&#~|?!%)]}\u2012\u2013\u2014\u2026\u00b7\u3001\u3002\uff0c\uff1a\uff1b\uff01\uff1f"
+_SEPARATOR = re.compile(rf"[{re.escape(_SEPARATORS)}\s]")
 _IN_WORDS = _HYPHENS + "'\u2019\u02bc\u00b7\u0640\u200c\u200d"
 
 
@@ -157,26 +159,29 @@ class Cutter:
         sign = self.hyphen if lettered else self.continuation
         if text[cut.text - 1] in _HYPHENS and (not self.hyphen or cut.first.endswith(self.hyphen)):
             sign = ""
-        return cut._replace(first=cut.first + sign, mark=sign, hyphenated=at_syllable, lettered=lettered)
+        return Cut(
+            cut.text, cut.cells, cut.first + sign, sign, cut.restated, cut.ending, cut.left_out, at_syllable, lettered
+        )
 
     def _options(self, text: str, lettered: bool) -> Iterator[tuple[list[int], bool]]:
         """Places in the text, the best kind first; whether they are syllables."""
-        yield [at for at in range(1, len(text)) if _separated(text, at)], False
-        before = list(accumulate((char.isalnum() for char in text), initial=0))
+        yield _separated(text), False
+        starts = [at for at in range(1, len(text)) if text.isascii() or _cluster_start(text, at) == at]
+        before = list(accumulate(map(str.isalnum, text), initial=0))
 
-        def fair(at: int, least: int) -> bool:
-            return before[at] >= least <= before[-1] - before[at] and _cluster_start(text, at) == at
+        def fair(least: int) -> list[int]:
+            return [at for at in starts if before[at] >= least <= before[-1] - before[at]]
 
         if lettered:
             # A piece of one letter would be read as a word of its own.
-            yield [at for at in self.points(text) if fair(at, SHORTEST_PIECE)], True
-            yield [at for at in range(1, len(text)) if fair(at, SHORTEST_PIECE)], False
+            whole = fair(SHORTEST_PIECE)
+            yield [at for at in self.points(text) if at in whole], True
+            yield whole, False
         else:
-            yield [at for at in range(1, len(text)) if fair(at, 1) and _changes(text[at - 1], text[at])], False
-            small = [at for at in range(1, len(text)) if _small(text[at - 1]) and _small(text[at])]
-            yield [at for at in small if fair(at, 1)], False
-        yield [at for at in range(1, len(text)) if fair(at, 1)], False
-        yield [at for at in range(1, len(text)) if fair(at, 0)], False
+            yield [at for at in fair(1) if _changes(text[at - 1], text[at])], False
+            yield [at for at in fair(1) if _small(text[at - 1]) and _small(text[at])], False
+        yield fair(1), False
+        yield fair(0), False
 
     def _anywhere(self, text: str, cells: str, room: int, lettered: bool) -> Cut:
         """The last place whose first part at least is written so alone; else the last cell."""
@@ -193,20 +198,19 @@ class Cutter:
 
 def _lettered(text: str) -> bool:
     """Whether a word has letters only, apart from signs around it."""
+    if text.isalpha():
+        return True
     first = next((at for at, char in enumerate(text) if char.isalnum()), 0)
     last = next((at for at in range(len(text) - 1, -1, -1) if text[at].isalnum() or extends(text[at])), -1)
     core = text[first : last + 1]
     return bool(core) and all(char.isalpha() or extends(char) or char in _IN_WORDS for char in core)
 
 
-def _separated(text: str, at: int) -> bool:
-    """Whether a separator of the word's own ends before `at`, with something to read on both sides."""
-    before, after = text[at - 1], text[at]
-    return (
-        (before in _SEPARATORS or before.isspace())
-        and (after.isalnum() or after in "([{\u00ab\u201c")
-        and any(char.isalnum() for char in text[:at])
-    )
+def _separated(text: str) -> list[int]:
+    """Where separators of the word's own end, with something to read on both sides."""
+    ends = [match.end() for match in _SEPARATOR.finditer(text, 0, len(text) - 1)]
+    first = next((at for at, char in enumerate(text) if char.isalnum()), len(text)) if ends else 0
+    return [at for at in ends if first < at and (text[at].isalnum() or text[at] in "([{\u00ab\u201c")]
 
 
 def _changes(before: str, after: str) -> bool:
@@ -218,12 +222,16 @@ def _small(char: str) -> bool:
 
 
 def _common_end(one: str, other: str) -> int:
-    shorter = min(len(one), len(other))
-    return next((at for at in range(shorter) if one[-1 - at] != other[-1 - at]), shorter)
+    return _common_start(one[::-1], other[::-1])
 
 
 def _common_start(one: str, other: str) -> int:
-    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    same = 0
+    for a, b in zip(one, other, strict=False):
+        if a != b:
+            break
+        same += 1
+    return same
 
 
 def _cluster_start(text: str, at: int) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from ..scene import GoesOn, PageNumber
 from .dots import BLANK
-from .layout import FLUSH, Cut, Cutting, Layout, LineStyle, Page, PlacedWord, SplitNote
+from .layout import FLUSH, Cut, Cutting, Layout, LineStyle, Page, PlacedWord
 
 __all__ = ["paginate"]
 
@@ -15,7 +15,7 @@ MARGIN = 3
 """Blank cells on both sides of a block that is centred."""
 
 
-@dataclass
+@dataclass(slots=True)
 class _Run:
     """A run of a page: its cells, the span of source they show, and what is cut at its end."""
 
@@ -31,25 +31,28 @@ class _Run:
 class _Filler:
     """The page being filled: the runs that are `done`, and the `run` at work, of which `size` cells may be taken.
 
+    What a word or a style fills is in `made`, for whoever asks to take out.
+
     Parameters
     ----------
     layout : of the pages.
+    cut : where to cut a word that has more cells than the room given.
     numbered : the cells at the end of page n that show its number, blanks before them included; None for none.
-    note : told of every cut when its page is done.
     blanks : whether a blank page follows every paragraph, and is counted.
     """
 
-    def __init__(self, layout: Layout, numbered: Callable[[int], str] | None, note: SplitNote, blanks: bool) -> None:
+    def __init__(self, layout: Layout, cut: Cutting, numbered: Callable[[int], str] | None, blanks: bool) -> None:
         self.layout = layout
         self.runs_per_page = layout.capacity // layout.run
         self.width = layout.cells_per_line
         self.signs = tuple(sign for sign in (layout.hyphen, layout.continuation) if sign)
+        self.made: list[Page] = []
         self.done: list[_Run] = []
         self.style = FLUSH
         self.first = True
         self.owed = False
         self.last = ""
-        self._numbered, self._note, self._blanks = numbered, note, blanks
+        self._cut, self._numbered, self._blanks = cut, numbered, blanks
         self._page_number, self._end = 1, 0
         self._tail = numbered(1) if numbered else ""
         self._new_run()
@@ -59,6 +62,54 @@ class _Filler:
         self.size = self.layout.run - MARGIN * self.style.centred
         if len(self.done) == self.runs_per_page - 1:
             self.size -= len(self._tail)
+
+    def put(self, word: PlacedWord) -> None:
+        """Put a word where it goes, in parts where it does not fit."""
+        word, position = self.fitted(word)
+        self.place(position, word.cells, word, word.end)
+
+    def fitted(self, word: PlacedWord) -> tuple[PlacedWord, int]:
+        """The word, or what is left of it when its first parts are placed, and where it goes in the run."""
+        position = self.spot(word)
+        if position < 0 and self.run.cells:
+            self.end_run(True)
+            position = self.spot(word)
+        whole = word
+        while position < 0:
+            room = self.size - self.indent(word)
+            if self.cramped(word):
+                self.break_page()
+            elif room < 1:
+                # A single cell has no other place for the blank between two words.
+                self.end_run(True)
+            else:
+                found = self._cut(word, room)
+                self.run.cut = whole, found
+                word = self._part(word, found)
+            position = self.spot(word)
+        return word, position
+
+    def _part(self, word: PlacedWord, found: Cut) -> PlacedWord:
+        """Place the first part of a word, and give the rest."""
+        marked = bool(self.signs) and found.first.endswith(self.signs)
+        position = self.indent(word) if marked else self.size - len(found.first)
+        end = start = word.end
+        if 0 < found.text < len(word.text):
+            start = word.source(found.text)
+            # A character whose name is cut is shown on both pages.
+            shared = start == word.source(found.text - 1)
+            end = start + 1 if shared else max(start, word.start + 1)
+            start = start if shared else end
+        self.place(position, found.first, word, end)
+        self.end_run(False)
+        return word._replace(
+            cells=found.restated + word.cells[found.cells :],
+            text=word.text[found.text :],
+            at=word.at + found.text,
+            start=min(start, word.end - 1),
+            lettered=found.lettered,
+            kept=len(found.restated),
+        )
 
     def place(self, position: int, cells: str, word: PlacedWord, end: int) -> None:
         """Put cells of a word in the run at work."""
@@ -96,30 +147,30 @@ class _Filler:
         margin = MARGIN * self.style.centred
         return beside and self.indent(word) + len(word.cells) <= self.layout.run - margin
 
-    def begin(self, style: LineStyle) -> Iterator[Page]:
+    def begin(self, style: LineStyle) -> None:
         """End the block at work, and begin one of this style."""
         if self.run.cells:
             self.run.ends_block, self.run.ends_paragraph = True, not style.line
-            yield from self.end_run(True)
+            self.end_run(True)
         if self.layout.lined:
             if style.page:
-                yield from self.end_page()
-            yield from self._skip_lines(style)
+                self.end_page()
+            self._skip_lines(style)
             if style.first != self.style.over or (self.done and not self.done[-1].cells):
                 # Where it begins, or an empty line, says that no word goes on in it.
                 self.owed, self.last = False, ""
         self.style, self.first = style, True
         self._new_run()
 
-    def _skip_lines(self, style: LineStyle) -> Iterator[Page]:
+    def _skip_lines(self, style: LineStyle) -> None:
         """The empty lines above a block; where they and its first line do not fit, the page ends."""
         if self.done and len(self.done) + style.before + 1 + style.leads > self.runs_per_page:
-            yield from self.break_page()
+            self.break_page()
         if (self.done or style.page) and len(self.done) + style.before < self.runs_per_page:
             leads = bool(self.done) and self.done[-1].leads
             self.done += [_Run(end=self._end, leads=leads) for _ in range(style.before)]
 
-    def end_run(self, word_ends: bool) -> Iterator[Page]:
+    def end_run(self, word_ends: bool) -> None:
         """End the run at work; `word_ends` where its last word does not go on in the next."""
         layout, run = self.layout, self.run
         full = len(run.cells) == self.size
@@ -133,10 +184,10 @@ class _Filler:
         self.done.append(run)
         self.first = False
         if len(self.done) == self.runs_per_page:
-            yield from self.break_page()
+            self.break_page()
         self._new_run()
 
-    def break_page(self) -> Iterator[Page]:
+    def break_page(self) -> None:
         """End the page; what leads to the next lines goes to them, unless the page has nothing else."""
         kept = len(self.done)
         while kept and self.done[kept - 1].leads:
@@ -144,28 +195,30 @@ class _Filler:
         kept = kept or len(self.done)
         rest = self.done[kept:]
         del self.done[kept:]
-        yield from self.end_page()
+        self.end_page()
         self.done += rest
 
-    def end_page(self) -> Iterator[Page]:
+    def end_page(self) -> None:
         """The page as it is, if there is anything on it."""
-        if not any(run.start >= 0 for run in self.done) and self.layout.lined:
-            self.done.clear()
-        if not self.done:
-            return
         runs, layout = self.done, self.layout
         self.done = []
-        starts = [run.start for run in runs if run.start >= 0]
-        notes = []
+        cells, start, last = "", -1, None
+        goes_on: list[GoesOn] = []
+        cuts: list[tuple[PlacedWord, Cut]] = []
         for number, run in enumerate(runs):
+            cells += run.cells or BLANK * layout.run
+            if run.start >= 0:
+                start, last = run.start if start < 0 else start, run
             if run.cut is not None:
-                self._note(*run.cut)
-                cut = run.cut[1]
-                notes.append(GoesOn(number, cut.mark, cut.restated, cut.ending, cut.left_out))
-        last = next((run for run in reversed(runs) if run.start >= 0), runs[-1])
-        cells = "".join(run.cells or BLANK * layout.run for run in runs).ljust(layout.capacity, BLANK)
-        start = starts[0] if starts else last.end
-        yield self._with_number(Page(cells, start, last.end, last.ends_block, last.ends_paragraph, tuple(notes)))
+                _, cut = run.cut
+                goes_on.append(GoesOn(number, cut.mark, cut.restated, cut.ending, cut.left_out))
+                cuts.append(run.cut)
+        if last is None and (layout.lined or not runs):
+            return
+        last = last or runs[-1]
+        start, cells = start if start >= 0 else last.end, cells.ljust(layout.capacity, BLANK)
+        page = Page(cells, start, last.end, last.ends_block, last.ends_paragraph, tuple(goes_on), None, tuple(cuts))
+        self.made.append(self._with_number(page))
         self._page_number += 1 + (self._blanks and last.ends_paragraph)
         if self._numbered is not None:
             self._tail = self._numbered(self._page_number)
@@ -186,7 +239,6 @@ def paginate(
     words: Iterable[PlacedWord | LineStyle],
     layout: Layout,
     cut: Cutting,
-    note: SplitNote,
     numbered: Callable[[int], str] | None = None,
     blanks: bool = False,
 ) -> Iterator[Page]:
@@ -197,79 +249,37 @@ def paginate(
     words : in reading order, a style before each block; without one they are one block, flush.
     layout : of the pages.
     cut : where to cut a word that has more cells than the room given.
-    note : told of every cut, when its page comes.
     numbered : the cells at the end of page n, from 1, that show its number, blanks before them included; None where
         none do.
     blanks : whether a blank page follows every paragraph, and is counted.
     """
-    filler = _Filler(layout, numbered, note, blanks)
+    filler = _Filler(layout, cut, numbered, blanks)
+    made = filler.made
     held: PlacedWord | None = None
     for word in words:
-        if held is not None and isinstance(word, PlacedWord) and word.glued:
-            held = _glued((yield from _fitted(held, filler, cut)), word)
-            continue
-        if held is not None:
-            held = yield from _fitted(held, filler, cut)
-            filler.place(filler.spot(held), held.cells, held, held.end)
-            held = None
-        if isinstance(word, PlacedWord):
-            held = word
+        if not isinstance(word, PlacedWord):
+            if held is not None:
+                filler.put(held)
+                held = None
+            filler.begin(word)
+        elif held is not None and word.glued:
+            held = _glued(filler.fitted(held)[0], word)
         else:
-            yield from filler.begin(word)
+            if held is not None:
+                filler.put(held)
+            held = word
+        if made:
+            yield from made
+            made.clear()
     if held is not None:
-        held = yield from _fitted(held, filler, cut)
-        filler.place(filler.spot(held), held.cells, held, held.end)
-    yield from filler.begin(FLUSH)
-    yield from filler.end_page()
+        filler.put(held)
+    filler.begin(FLUSH)
+    filler.end_page()
+    yield from made
 
 
 def _glued(before: PlacedWord, word: PlacedWord) -> PlacedWord:
     places = [part.source(index) for part in (before, word) for index in range(len(part.text))]
     return PlacedWord(
         before.cells + word.cells, before.text + word.text, before.start, word.end, places, 0, 0, False, before.lettered
-    )
-
-
-def _fitted(word: PlacedWord, filler: _Filler, cut: Cutting) -> Generator[Page, None, PlacedWord]:
-    """The word, or what is left of it when its first parts are placed, with a run that has room for it."""
-    if filler.spot(word) >= 0:
-        return word
-    if filler.run.cells:
-        yield from filler.end_run(True)
-    whole = word
-    while filler.spot(word) < 0:
-        if filler.cramped(word):
-            yield from filler.break_page()
-            continue
-        room = filler.size - filler.indent(word)
-        if room < 1:
-            # A single cell has no other place for the blank between two words.
-            yield from filler.end_run(True)
-            continue
-        found = cut(word, room)
-        filler.run.cut = whole, found
-        word = yield from _part(word, found, filler)
-    return word
-
-
-def _part(word: PlacedWord, found: Cut, filler: _Filler) -> Generator[Page, None, PlacedWord]:
-    """Place the first part of a word, and give the rest."""
-    marked = bool(filler.signs) and found.first.endswith(filler.signs)
-    position = filler.indent(word) if marked else filler.size - len(found.first)
-    end = start = word.end
-    if 0 < found.text < len(word.text):
-        start = word.source(found.text)
-        # A character whose name is cut is shown on both pages.
-        shared = start == word.source(found.text - 1)
-        end = start + 1 if shared else max(start, word.start + 1)
-        start = start if shared else end
-    filler.place(position, found.first, word, end)
-    yield from filler.end_run(False)
-    return word._replace(
-        cells=found.restated + word.cells[found.cells :],
-        text=word.text[found.text :],
-        at=word.at + found.text,
-        start=min(start, word.end - 1),
-        lettered=found.lettered,
-        kept=len(found.restated),
     )

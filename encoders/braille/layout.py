@@ -23,12 +23,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from ..errors import LayoutError
 from ..scene import GoesOn, GridShape, PageNumber
 
-__all__ = ["FLUSH", "Cut", "Cutting", "Layout", "LineStyle", "Page", "PlacedWord", "SplitNote", "cut_anywhere"]
+__all__ = ["FLUSH", "Cut", "Cutting", "Layout", "LineStyle", "Page", "PlacedWord", "cut_anywhere"]
 
 NARROW = 8
 """Lines of fewer cells have no room for hyphens; words flow over the lines of a page."""
@@ -62,27 +63,27 @@ class Layout:
                 f"a grid of {self.shape.rows} x {self.shape.cols} actuators has no room for a cell of {self.height} x 2"
             )
 
-    @property
+    @cached_property
     def lines(self) -> int:
         """Lines on a page."""
         return (self.shape.rows + self.line_gap) // (self.height + self.line_gap)
 
-    @property
+    @cached_property
     def cells_per_line(self) -> int:
         """Cells in a line."""
         return (self.shape.cols + self.cell_gap) // (2 + self.cell_gap)
 
-    @property
+    @cached_property
     def capacity(self) -> int:
         """Cells on a page."""
         return self.lines * self.cells_per_line
 
-    @property
+    @cached_property
     def run(self) -> int:
         """Cells in a run: a line, or a page when lines are narrow."""
         return self.cells_per_line if self.cells_per_line >= NARROW else self.capacity
 
-    @property
+    @cached_property
     def lined(self) -> bool:
         """Whether a page is several runs, each a line."""
         return self.run < self.capacity
@@ -159,7 +160,8 @@ class Page(NamedTuple):
     """`cells` of a full page, lines run together and padded with blanks.
 
     `end_of_block` where what is last on it ends there: a paragraph (`end_of_paragraph`), or a kept line of one.
-    `number` is the page's number where it stands among the cells, which are not of the text there.
+    `number` is the page's number where it stands among the cells, which are not of the text there. `cuts` are the words
+    that are cut on it.
     """
 
     cells: str
@@ -169,9 +171,9 @@ class Page(NamedTuple):
     end_of_paragraph: bool
     goes_on: tuple[GoesOn, ...] = ()
     number: PageNumber | None = None
+    cuts: tuple[tuple[PlacedWord, Cut], ...] = ()
 
 
-SplitNote = Callable[[PlacedWord, Cut], None]
 Cutting = Callable[[PlacedWord, int], Cut]
 
 

@@ -42,7 +42,7 @@ def presenter(layout: Layout, presentation: Presentation) -> Callable[[str], Sho
         # The low byte of U+28xx says which dots there are.
         codes = np.frombuffer(page.encode("utf-16-le"), dtype=np.uint8)[::2]
         grid = np.zeros(shape, dtype=np.complex128)
-        grid.put(spots, dots_of[codes])
+        grid.put(spots, dots_of.take(codes, axis=0))
         lines = "\n".join([page[at : at + width] for at in range(0, len(page), width)])
         return ShownPage(lines, tuple([_pattern(part) for part in _parts(grid, places, presentation)]))
 

@@ -14,14 +14,14 @@ import numpy as np
 
 from ..choices import EmphasisChoice, PageNumbering, Presentation, TextOptions
 from ..errors import LayoutError
-from ..scene import Frame, GridShape, PageNumber, Scene, TargetPattern
+from ..scene import Frame, GridShape, Heading, PageNumber, Scene, TargetPattern
 from . import louis_binding
 from .alphabet import own_letters_eight
 from .back_check import BackCheck, FeltPage, back_check
 from .dots import BLANK, HIGHEST_6_DOT
 from .filling import paginate
 from .joining import emphases_within
-from .layout import FLUSH, Cut, Layout, LineStyle, Page, PlacedWord, SplitNote, cut_anywhere
+from .layout import FLUSH, Cut, Layout, LineStyle, Page, PlacedWord, cut_anywhere
 from .presentation import MIN_PART_S, presenter, read_page
 from .readers.sources import SourceKind, TextSource
 from .report import EncodingReport, ReportLog, Split
@@ -213,15 +213,16 @@ class TextFrames:
         if self._kept is not None:
             yield from self._kept
             return
-        kept: list[Frame] | None = []
+        kept: list[Frame] = []
         most = MOST_KEPT // (self.layout.shape.rows * self.layout.shape.cols)
-        for number, frame in enumerate(self._moved(), 1):
-            if number > most:
-                kept = None
-            if kept is not None:
-                kept.append(frame)
+        for frame in (frames := self._moved()):
             yield frame
-        self._kept = None if kept is None else tuple(kept)
+            kept.append(frame)
+            if len(kept) > most:
+                kept.clear()
+                yield from frames
+                return
+        self._kept = tuple(kept)
 
     def _moved(self) -> Iterator[Frame]:
         if self.options.presentation is not Presentation.SCROLL:
@@ -235,33 +236,38 @@ class TextFrames:
         text, between = self.source.text, False
         own_frame = self.options.page_numbers is PageNumbering.FRAME
         total = sum(1 for _ in self.page_spans()) if own_frame else 0
-        for number, page in enumerate(self._pages(log, self._note)):
+        for number, page in enumerate(self._pages(log)):
             if between:
                 yield self._blank_frame(log, page.start)
             if own_frame:
                 yield from self._number_frames(log, number + 1, total, page.start)
             # A break between paragraphs belongs to the page before it, so that the spans tell where it was.
             gap = PARAGRAPH_END.match(text, page.end) if page.end_of_block else None
-            span = (page.start, gap.end() if gap else page.end)
-            places = [bisect_left(self._headings, at, key=itemgetter(0)) for at in span] if self._headings else (0, 0)
-            headings = tuple([heading for _, heading in self._headings[slice(*places)]])
-            for frame in self._shown(page, log.pages):
-                yield replace(frame, text=text[slice(*span)], span=span, goes_on=page.goes_on, headings=headings)
-                headings = ()
-                log.frames += 1
+            span = start, end = page.start, gap.end() if gap else page.end
+            for word, cut in page.cuts:
+                self._note(log, word, cut)
+            yield from self._shown(log, page, text[start:end], span)
             log.cells += len(page.cells) - page.cells.count(BLANK)
-            log.pages += 1
             between = self.options.blank_between and page.end_of_paragraph
 
-    def _shown(self, page: Page, number: int) -> Iterator[Frame]:
+    def _shown(self, log: ReportLog, page: Page, text: str, span: tuple[int, int]) -> Iterator[Frame]:
         """The frames of a page: its cells in one part or several, and how long."""
-        shown = self._show(page.cells)
+        shown, headings = self._show(page.cells), self._headings_of(span) if self._headings else ()
         said = page.cells if page.number is None else page.cells[: page.number.at]
         cells = len(said.rstrip(BLANK)) + (len(page.number.cells) if page.number else 0)
-        dwell_s = max(self._shortest_s, cells * self._s_per_cell)
-        share_s = dwell_s if len(shown.parts) == 1 else max(dwell_s / len(shown.parts), MIN_PART_S)
+        share_s = max(self._shortest_s, cells * self._s_per_cell)
+        if len(shown.parts) > 1:
+            share_s = max(share_s / len(shown.parts), MIN_PART_S)
         for pattern in shown.parts:
-            yield Frame(pattern, share_s, number, cells=shown.cells, number=page.number)
+            yield Frame(pattern, share_s, log.pages, text, span, shown.cells, page.goes_on, headings, page.number)
+            headings = ()
+            log.frames += 1
+        log.pages += 1
+
+    def _headings_of(self, span: tuple[int, int]) -> tuple[Heading, ...]:
+        """The headings that begin in a span of the source."""
+        first, last = (bisect_left(self._headings, at, key=itemgetter(0)) for at in span)
+        return tuple(heading for _, heading in self._headings[first:last])
 
     def _number_frames(self, log: ReportLog, number: int, total: int, position: int) -> Iterator[Frame]:
         """The number of the page to come and of all, on a page or where that is too small on two."""
@@ -270,25 +276,22 @@ class TextFrames:
         for cells in [whole] if len(whole) <= room else [write(f"{number}"), write(f"/{total}")]:
             sign = cells[-room:]
             page = Page(sign.ljust(room, BLANK), position, position, False, False, number=PageNumber(0, sign))
-            for frame in self._shown(page, log.pages):
-                yield replace(frame, span=(position, position))
-                log.frames += 1
-            log.pages += 1
+            yield from self._shown(log, page, "", (position, position))
 
     def _corner(self, number: int) -> str:
         """The cells at the end of a page with its number: on narrow lines the last digit alone."""
         cells = self._transcriber.number(str(number))
         return 2 * BLANK + cells if self.layout.cells_per_line >= WIDE else cells[-1:]
 
-    def _pages(self, log: ReportLog, note: SplitNote) -> Iterator[Page]:
+    def _pages(self, log: ReportLog) -> Iterator[Page]:
         numbered = self._corner if self.options.page_numbers is PageNumbering.CORNER else None
         blanks = self.options.blank_between
-        return paginate(self._words(log), self.layout, self._cut, note, numbered, blanks)
+        return paginate(self._words(log), self.layout, self._cut, numbered, blanks)
 
     def page_spans(self) -> Iterator[tuple[int, int]]:
         """(start, end) in the source of every page, blank ones too, but not of numbers; nothing is drawn."""
         between = False
-        for page in self._pages(ReportLog(), lambda word, cut: None):
+        for page in self._pages(ReportLog()):
             if between:
                 yield page.start, page.start
             yield page.start, page.end
@@ -325,9 +328,9 @@ class TextFrames:
             return cut_anywhere(word, room)
         return self._transcriber.cut(word, room, self.layout.hyphen, self.layout.continuation)
 
-    def _note(self, word: PlacedWord, cut: Cut) -> None:
+    def _note(self, log: ReportLog, word: PlacedWord, cut: Cut) -> None:
         start = self.source.text[word.start : min(word.end, word.start + 80)]
-        self._log.split(Split(start, (word.start, word.end), self._log.pages, cut.hyphenated))
+        log.split(Split(start, (word.start, word.end), log.pages, cut.hyphenated))
 
     def check(self) -> BackCheck:
         """Read all frames as fingers would, back-translate, and compare with the source: together, and page by page.

@@ -177,6 +177,8 @@ class Transcriber:
 
 def _six_dots(cells: str) -> str:
     """Cells without dots 7 and 8; one that had no other dots is left out, as a blank there would end the word."""
+    if max(cells, default="") <= HIGHEST_6_DOT:
+        return cells
     return cells.translate(_ONLY_LOWER).translate(LOWER_SIX)
 
 

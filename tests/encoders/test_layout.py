@@ -56,7 +56,7 @@ def test_pages_join_to_the_words_again(words, glued, lines, width, hyphenating):
     if layout.hyphen and layout.run < 4:
         return
     placed = words_of(words, glued)
-    pages = list(paginate(placed, layout, every_other(layout), lambda *_: None))
+    pages = list(paginate(placed, layout, every_other(layout)))
     expected = "".join(("" if word.glued else "⠀") + word.cells for word in placed).strip("⠀")
     encoding = {"run": layout.run, "hyphen": layout.hyphen}
     shown = [lined(page.cells, layout) for page in pages]
@@ -71,7 +71,7 @@ def test_pages_join_to_the_words_again(words, glued, lines, width, hyphenating):
 def test_without_notes_the_dots_alone_join_the_pages(words, lines, width):
     layout = Layout(GridShape(3 * lines, 2 * width), 3)
     placed = words_of(words)
-    pages = [lined(page.cells, layout) for page in paginate(placed, layout, cut_anywhere, lambda *_: None)]
+    pages = [lined(page.cells, layout) for page in paginate(placed, layout, cut_anywhere)]
     assert join_pages(pages, {"run": layout.run, "hyphen": ""}) == "⠀".join(words)
 
 
@@ -79,7 +79,7 @@ def test_without_notes_the_dots_alone_join_the_pages(words, lines, width):
 def test_every_cell_is_shown_once_in_order_and_spans_cover_the_source(words, lines, width):
     layout = Layout(GridShape(3 * lines, 2 * width), 3)
     placed = words_of(words)
-    pages = list(paginate(placed, layout, cut_anywhere, lambda *_: None))
+    pages = list(paginate(placed, layout, cut_anywhere))
     assert "".join(page.cells for page in pages).replace("⠀", "") == "".join(words)
     covered = [at for page in pages for at in range(page.start, page.end)]
     source = {at for word in placed for at in range(word.start, word.end)}
@@ -90,8 +90,7 @@ def test_every_cell_is_shown_once_in_order_and_spans_cover_the_source(words, lin
 @given(st.lists(WORD, min_size=1, max_size=20), st.integers(1, 3), st.integers(1, 12))
 def test_only_words_longer_than_a_run_are_split(words, lines, width):
     layout = Layout(GridShape(3 * lines, 2 * width), 3)
-    split: list[str] = []
-    list(paginate(words_of(words), layout, cut_anywhere, lambda word, *_: split.append(word.cells)))
+    split = [word.cells for page in paginate(words_of(words), layout, cut_anywhere) for word, _ in page.cuts]
     assert {word for word in words if len(word) > layout.run} == {word for word in split if len(word) > layout.run}
     # A word that fills a run may meet the blank owed to the word before it.
     assert all(len(word) >= layout.run for word in split)
@@ -100,26 +99,25 @@ def test_only_words_longer_than_a_run_are_split(words, lines, width):
 def test_a_word_that_ends_in_the_last_cell_owes_a_blank_only_without_hyphens():
     for hyphen, then in (("", "⠀⠸⠺⠀⠀⠀"), ("⠤", "⠸⠺⠀⠀⠀⠀")):
         layout = Layout(GridShape(6, 6), 3, hyphen=hyphen)
-        pages = paginate(words_of(["⠠⠓⠑⠇⠇⠕", "⠸⠺"]), layout, cut_anywhere, lambda *_: None)
+        pages = paginate(words_of(["⠠⠓⠑⠇⠇⠕", "⠸⠺"]), layout, cut_anywhere)
         assert [page.cells for page in pages] == ["⠠⠓⠑⠇⠇⠕", then]
 
 
 def test_a_word_keeps_to_its_line_when_it_fits_one():
     layout = Layout(GridShape(6, 6), 3)
-    pages = [page.cells for page in paginate(words_of(["⠁⠁", "⠃⠃", "⠉⠉⠉⠉"]), layout, cut_anywhere, lambda *_: None)]
+    pages = [page.cells for page in paginate(words_of(["⠁⠁", "⠃⠃", "⠉⠉⠉⠉"]), layout, cut_anywhere)]
     assert pages == ["⠁⠁⠀⠃⠃⠀", "⠉⠉⠉⠉⠀⠀"]
 
 
 def test_what_was_added_at_a_cut_is_noted_and_taken_out_again():
     layout, encoding = Layout(GridShape(6, 6), 3, hyphen="⠤"), {"run": 6, "hyphen": "⠤"}
-    seen: list[Cut] = []
     # Three cells, one of them only at the end of a word; then the hyphen. One cell is left out, one restated.
     cut = Cut(4, 4, "⠼⠃⠒⠤", "⠤", "⠼", "⠒", "⠃⠃")
-    pages = list(paginate(words_of(["⠼" + "⠃" * 7]), layout, lambda *_: cut, lambda _, one: seen.append(one)))
+    pages = list(paginate(words_of(["⠼" + "⠃" * 7]), layout, lambda *_: cut))
     assert [page.cells for page in pages] == ["⠼⠃⠒⠤⠀⠀", "⠼⠃⠃⠃⠃⠀"]
     goes_on = [page.goes_on for page in pages]
     assert goes_on == [(GoesOn(0, "⠤", "⠼", "⠒", "⠃⠃"),), ()]
-    assert seen == [cut]
+    assert [[one for _, one in page.cuts] for page in pages] == [[cut], []]
     assert join_pages([page.cells for page in pages], encoding, goes_on) == "⠼⠃⠃⠃⠃⠃⠃⠃"
     # What was to be there and is not felt is not taken out, so that it makes a difference.
     assert join_pages(["⠼⠃⠒⠀⠀⠀", pages[1].cells], encoding, goes_on) == "⠼⠃⠒⠀⠼⠃⠃⠃⠃"
@@ -130,19 +128,19 @@ def test_what_was_added_at_a_cut_is_noted_and_taken_out_again():
 
 def test_a_first_part_without_a_sign_ends_with_its_run():
     layout, cut = Layout(GridShape(6, 6), 3), Cut(4, 4, "⠁" * 4)
-    pages = [page.cells for page in paginate(words_of(["⠁" * 8]), layout, lambda *_: cut, lambda *_: None)]
+    pages = [page.cells for page in paginate(words_of(["⠁" * 8]), layout, lambda *_: cut)]
     assert pages == ["⠀⠀⠁⠁⠁⠁", "⠁⠁⠁⠁⠀⠀"]
 
 
 def test_no_page_is_only_the_blank_that_a_word_owes_the_next():
     layout = Layout(GridShape(6, 6), 3)
-    pages = [page.cells for page in paginate(words_of(["⠁" * 6, "⠃" * 6]), layout, cut_anywhere, lambda *_: None)]
+    pages = [page.cells for page in paginate(words_of(["⠁" * 6, "⠃" * 6]), layout, cut_anywhere)]
     assert pages == ["⠁⠁⠁⠁⠁⠁", "⠀⠃⠃⠃⠃⠃", "⠃⠀⠀⠀⠀⠀"]
 
 
 def test_wide_grids_are_filled_line_by_line():
     layout = Layout(GridShape(6, 2 * NARROW), 3)
-    pages = paginate(words_of(["⠁" * 5, "⠃" * 5, "⠉" * 2]), layout, cut_anywhere, lambda *_: None)
+    pages = paginate(words_of(["⠁" * 5, "⠃" * 5, "⠉" * 2]), layout, cut_anywhere)
     assert [lined(page.cells, layout) for page in pages] == ["⠁⠁⠁⠁⠁⠀⠀⠀\n⠃⠃⠃⠃⠃⠀⠉⠉"]
 
 

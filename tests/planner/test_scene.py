@@ -207,7 +207,8 @@ def test_frames_are_planned_as_they_are_taken(device: Device) -> None:
     plan = plan_scene(Scene(GridShape(6, 6), scene), device)
     assert scene.taken == 0
     assert len(list(islice(plan.frames, 10))) == 10
-    assert scene.taken <= 11
+    # As many again may be read ahead, up to 64.
+    assert scene.taken <= 20
 
 
 def test_memory_does_not_grow_with_frames() -> None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from chainsim import load_device
+from chainsim import Device, load_device
 from encoders import Frame, GridShape, Scene, TargetPattern
 from planner import frame_change, plan_scene
+from planner.cache_file import CacheFile
 from planner.frame_change import ChainSteps, Change, change_to
+from planner.packed import packed
 from planner.unequal import memory_of
 from tests.planner.test_unequal import measured
 
@@ -85,3 +89,63 @@ def test_where_one_drive_is_common_nothing_is_remembered() -> None:
     remembered = ChainSteps(memory)
     remembered.change(memory.at_rest, dots(1))
     assert not remembered._known
+
+
+@pytest.mark.parametrize(
+    "device",
+    [PAPER, UNEQUAL, *map(load_device, ("linked-6x6", "paper-6x6-common"))],
+    ids=["paper", "unequal", "linked", "common"],
+)
+def test_what_is_planned_ahead_is_what_one_change_after_another_gives(
+    device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    frames = [Frame(dots(seed), 1.0) for seed in (*range(7), 3, 4, 5)]
+    ahead = [change for _, change in ChainSteps(memory_of(device, 20.0)).through(frames)]
+    # A cache of its own, so that it is all planned again.
+    monkeypatch.setenv("DOTWAVE_CACHE", str(tmp_path / "other"))
+    memory = memory_of(device, 20.0)
+    one_by_one, held = ChainSteps(memory), memory.at_rest
+    for frame, change in zip(frames, ahead, strict=True):
+        alone = one_by_one.change(held, frame.pattern)
+        assert replace(change, states=(), ramps=()) == replace(alone, states=(), ramps=())
+        assert [packed(state) for state in change.states] == [packed(state) for state in alone.states]
+        for ramp, same in zip(change.ramps, alone.ramps, strict=True):
+            if ramp is None or same is None:
+                assert ramp is same
+                continue
+            # What rings on is a difference of two large numbers.
+            assert packed(replace(ramp, residue=None)) == packed(replace(same, residue=None))
+            assert ramp.residue is None or ramp.residue == pytest.approx(same.residue, abs=1e-12)
+        held = alone.targets if alone.held else memory.at_rest
+
+
+def test_what_many_frames_bring_is_kept_in_few_transactions(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def find(_: CacheFile, keys: Sequence[bytes]) -> dict[bytes, bytes]:
+        asked.append(len(keys))
+        return {}
+
+    monkeypatch.setattr(CacheFile, "find", find)
+    monkeypatch.setattr(CacheFile, "keep", lambda _, rows: asked.append(sum(1 for _ in rows)))
+    frames = tuple(Frame(dots(seed), 1.0) for seed in range(256))
+    plan = plan_scene(Scene(GridShape(6, 6), frames), PAPER)
+    assert sum(1 for _ in plan.frames) == 257
+    # Frame by frame there would be several hundred; so for 10 blocks, the way out, and while rows are met first.
+    assert sum(asked) > 2000
+    assert len(asked) <= 100
+
+
+def test_few_frames_are_read_ahead() -> None:
+    read: list[int] = []
+
+    def frames() -> Iterator[Frame]:
+        for seed in range(300):
+            read.append(seed)
+            yield Frame(dots(seed % 3), 1.0)
+
+    steps = ChainSteps(memory_of(PAPER, 20.0)).through(frames())
+    next(steps)
+    assert len(read) == 1
+    most = max(len(read) - place for place, _ in enumerate(steps, 1))
+    assert most <= 384 // 6

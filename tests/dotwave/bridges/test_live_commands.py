@@ -43,6 +43,20 @@ def test_a_line_is_felt_recorded_and_felt_again(tmp_path: Path) -> None:
     assert "⠠⠓⠑⠇⠇⠕" in felt
 
 
+@pytest.mark.parametrize("command", ["live", "replay"])
+def test_only_sinks_that_play_live_are_offered(command: str, tmp_path: Path) -> None:
+    shown = dotwave(command, "--help", folder=tmp_path).stdout
+    assert "controller:PORT or none." in shown
+    assert "audio" not in shown
+
+
+def test_a_sound_card_is_refused_in_one_line_that_says_what_it_can_do(tmp_path: Path) -> None:
+    ran = dotwave("live", "--from", "lines", "--device", "paper-6x6", "--to", "audio:0", folder=tmp_path, input="Hi\n")
+    assert ran.returncode == 2
+    (line,) = ran.stderr.splitlines()
+    assert line.endswith("a sound card plays written files (dotwave play OUT --audio CARD)")
+
+
 @needs_brlapi
 def test_ctrl_c_ends_a_session_that_serves_a_client(tmp_path: Path) -> None:
     line = [sys.executable, "-m", "dotwave", "live", "--device", "paper-6x6", "--show"]

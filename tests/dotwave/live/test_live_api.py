@@ -142,6 +142,8 @@ def test_what_is_no_place_to_play_live() -> None:
     for sink in ("audio:", "controller:", "/dev/ttyACM0"):
         with pytest.raises(dw.AppError, match="expected controller:PORT or none:"):
             dw.Live("paper-6x6", sink)
+    with pytest.raises(dw.AppError, match=r"sound card plays written files \(dotwave play OUT --audio CARD\)$"):
+        dw.Live("paper-6x6", "audio:0")
     with pytest.raises(dw.AppError, match=r"lead_s: expected 0\.02 to 1 s"):
         dw.Live("paper-6x6", lead_s=2.0)
     with pytest.raises(dw.AppError, match="idle_s"):
