@@ -168,7 +168,7 @@ def on_samples(events: Iterable[CouplingEvent], rate_hz: int, rows: int, cols: i
             continue
         end_s = np.array([event.t_s + event.ramp_s for event in row])
         near_s = np.rint(end_s * rate_hz) / rate_hz
-        along = _RowTrack.of(row, cols).at(near_s)
+        along = _RowTrack.of(row, cols - 1).at(near_s)
         after = [(event.t_s, event.ramp_s) for event in row[1:]] + [(np.inf, 0.0)]
         for k, (event, (next_s, ramp_s)) in enumerate(zip(row, after, strict=True)):
             goes_on = event.ramp_s > 0 and (ramp_s > 0 or next_s > near_s[k])
