@@ -119,7 +119,7 @@ def test_a_text_cannot_send_commands_to_the_terminal(dotwave, stand_in, options)
 
 @pytest.mark.parametrize(("report", "code"), [(GOOD, 0), (BAD, 1), (replace(GOOD, text_equal=False), 1)])
 def test_verify_exit_code(dotwave, stand_in, report, code) -> None:
-    stand_in("api.felt", verify=lambda path: report)
+    stand_in("api.felt", verify=lambda path, icon: report)
     assert dotwave("verify", "x.wav").code == code
     assert json.loads(dotwave("verify", "x.wav", "--json").out)["ok"] is (code == 0)
 
@@ -128,7 +128,7 @@ def test_verify_exit_code(dotwave, stand_in, report, code) -> None:
     "root", [AppError, chainsim.ChainError, drivers.DriverError, encoders.EncodeError, planner.PlanError]
 )
 def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
-    def fail(path: Path) -> VerifyReport:
+    def fail(path: Path, icon: str | None) -> VerifyReport:
         raise root(f"{path}: what is wrong\nand the cure")
 
     stand_in("api.felt", verify=fail)
@@ -137,7 +137,7 @@ def test_bad_input_is_one_line_and_exit_code_2(dotwave, stand_in, root) -> None:
 
 
 def test_ctrl_c_is_130(dotwave, stand_in) -> None:
-    def interrupt(path: Path) -> VerifyReport:
+    def interrupt(path: Path, icon: str | None) -> VerifyReport:
         raise KeyboardInterrupt
 
     stand_in("api.felt", verify=interrupt)
@@ -152,7 +152,7 @@ import signal, sys, types
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell in the background had ignored
 from pathlib import Path
 from dotwave.cli.app import main
-def verify(path):
+def verify(path, icon):
     partial = Path({str(partial)!r})
     try:
         partial.touch()

@@ -20,7 +20,7 @@ def failing(dotwave, monkeypatch: pytest.MonkeyPatch):
     """End a command with an error of our choice."""
 
     def end(error: BaseException):
-        def fail(path: Path) -> None:
+        def fail(path: Path, icon: str | None) -> None:
             raise error
 
         fake = ModuleType("dotwave.api.felt")
