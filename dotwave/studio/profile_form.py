@@ -24,7 +24,7 @@ UNITS = {
     "omega.min": "over f0", "omega.max": "over f0", "amplifier.volts": "volts", "rows": "actuators",
     "cols": "actuators",
     "amplifier.slew_v_per_s": "volts a second", "amplifier.rate_hz": "samples a second", "chain_length": "actuators",
-    "amplifier.bits": "bits; empty for any", "coupling.bits": "bits; empty for any",
+    "amplifier.bits": "bits; empty for any", "coupling.bits": "bits; empty for any", "modulation.hz": "hertz",
 }  # fmt: skip
 
 
@@ -67,15 +67,16 @@ def _schema() -> dict[str, Any]:
 
 
 def _fields(
-    profile: Mapping[str, Any], schema: Mapping[str, Any], notes: Mapping[str, Any], inside: str
+    profile: Mapping[str, Any] | None, schema: Mapping[str, Any], notes: Mapping[str, Any], inside: str
 ) -> Iterator[ProfileField]:
-    for key, rule in schema["properties"].items():
-        name, rule = inside + key, _resolved(rule)
-        value = profile.get(key, rule.get("default"))
+    """Those of one section; None: it is left out, and so are its usual values."""
+    for key, given in schema["properties"].items():
+        name, rule = inside + key, _resolved(given)
+        value = None if profile is None else profile.get(key, rule.get("default"))
         if key == "schema":
             continue
         if "properties" in rule and name not in LISTS:
-            yield from _fields(value or {}, rule, notes, f"{name}.")
+            yield from _fields(value if _optional(given) else value or {}, rule, notes, f"{name}.")
             continue
         note = notes.get(name) or notes.get(name.split(".")[0]) or {}
         source = f"{'assumed' if note['assumed'] else 'given'} because: {note['why']}" if note else ""
@@ -99,6 +100,11 @@ def _resolved(rule: Mapping[str, Any]) -> dict[str, Any]:
     if "$ref" in rule:
         return dict(_schema()["$defs"][rule["$ref"].rsplit("/", 1)[1]])
     return dict(rule)
+
+
+def _optional(rule: Mapping[str, Any]) -> bool:
+    """Whether there may be nothing in its place."""
+    return any(one.get("type") == "null" for one in rule.get("anyOf", ()))
 
 
 def _span(rule: Mapping[str, Any]) -> str:

@@ -107,6 +107,7 @@ def test_a_ring_of_separate_actuators() -> None:
     assert state.error < 1e-9
 
 
+@pytest.mark.slow
 def test_a_ring_that_howls_is_not_called_ok() -> None:
     """Above its critical lam a ring has no rest, whatever the bias (docs/theory.md section 3)."""
     (state,) = Deflection(altered(closure=Closure.RING, lam_min=0.02)).states(np.array([[1.0, 0, 1, 1, 0, 1]]))

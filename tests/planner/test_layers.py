@@ -45,7 +45,7 @@ def test_importing_the_planner_loads_nothing_heavy() -> None:
         ("paper-6x6", 5, "amplitudes.deflection", False),
         ("linked-6x6", 5, "amplitudes.vibration", True),
         ("independent-6x6", 5, "amplitudes.vibration", False),
-        ("paper-6x6-ring", 4, "waves.wave_state", False),
+        pytest.param("paper-6x6-ring", 4, "waves.wave_state", False, marks=pytest.mark.slow),
     ],
 )
 def test_planning_loads_nothing_heavy(

@@ -159,6 +159,7 @@ def test_random_rows_over_links_through_the_file(tmp_path: Path) -> None:
     assert all(all(mark.modulated) for mark in manifest.frames)
 
 
+@pytest.mark.slow
 def test_a_letter_over_one_lam_through_the_file(tmp_path: Path) -> None:
     # f: both dots of the cell, then the left one.
     plan = plan_of([1, 1, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], device=load_device(ONE_LAM))

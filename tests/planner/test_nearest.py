@@ -77,6 +77,7 @@ def test_other_patterns_are_unreachable_with_the_nearest(device: Device) -> None
     assert near.max() > 0.3
 
 
+@pytest.mark.slow
 def test_a_ring_with_a_lam_per_link_is_not_told_to_get_one() -> None:
     state = wave_state(LINKED_RING, free([0.1, 1, 0.1, 1, 0.1, 1]))
     assert state.outcome is Outcome.UNREACHABLE

@@ -30,7 +30,7 @@ from planner import DwellTooShort, FramePlan, Plan, plan_scene
 from planner.closed_forms.wave_fit import response_to
 from planner.waves.wave_forms import wave_for
 
-NAMES = ["paper-6x6", "paper-6x6-common", "linked-6x6", "independent-6x6", "ultrasonic-6x6", "paper-6x6-ring"]
+NAMES = ["paper-6x6", "paper-6x6-common", "linked-6x6", "independent-6x6", "linked-ultrasonic-6x6", "paper-6x6-ring"]
 GRID = GridShape(6, 6)
 # Relative to full scale; tones are only known in the slow flow.
 EXACT, TONES = 1e-3, 1e-2
@@ -160,7 +160,7 @@ def missed(found: Counter[tuple[str, str, str, bool]]) -> tuple[int, int]:
     return sum(reached.values()), sum(number for key, number in reached.items() if key[2] != "ok")
 
 
-@pytest.mark.parametrize(("number", "reached"), [(12, 1), pytest.param(40, 5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("number", "reached"), [(5, 1), pytest.param(40, 5, marks=pytest.mark.slow)])
 def test_random_targets(number: int, reached: int, tmp_path: Path) -> None:
     total, lost = missed(run(trials(number, 1), tmp_path))
     assert total >= reached

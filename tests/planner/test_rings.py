@@ -85,6 +85,7 @@ def test_a_wave_stands_within_a_second_and_is_gone_in_two(lag_deg: float, level:
     assert np.abs(gone).max() < 1.1e-3 * scale
 
 
+@pytest.mark.slow
 def test_programmable_links_hold_dots_on_a_ring_where_it_stays_stable() -> None:
     family = Planner(LINKED, 20.0)
     targets = [AmplitudeTarget.of(np.array(list(row), dtype=np.float64)) for row in ("100100", "000100")]

@@ -38,7 +38,10 @@ class CountedChanges:
         return change_to(*given)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", ["paper-6x6", "linked-6x6", "paper-6x6-common", "paper-6x6-ring"])
+@pytest.mark.parametrize(
+    "name",
+    ["paper-6x6", "linked-6x6", "paper-6x6-common", pytest.param("paper-6x6-ring", marks=pytest.mark.slow)],
+)
 def test_remembered_changes_are_those_worked_out(name: str) -> None:
     device = load_device(name)
     memory = memory_of(device, 20.0)

@@ -190,6 +190,7 @@ def test_one_drive_moves_all_chains_alike() -> None:
     assert len({(one.epsilon, one.omega) for one in alike.states}) == 1
 
 
+@pytest.mark.slow
 def test_one_lam_for_all_chains() -> None:
     """With a drive per chain and one lam, rows of one wave and of another level share it."""
     device = COMMON.model_copy(update={"drive": "chain"})

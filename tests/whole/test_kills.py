@@ -220,7 +220,7 @@ class Harness:
         self.seen |= Counter({"kills": kills, "rounds": rounds})
 
 
-@pytest.mark.parametrize("name", one_in(2, CASES))
+@pytest.mark.parametrize("name", one_in(4, CASES))
 def test_killed_a_few_times(tmp_path: Path, name: str) -> None:
     harness = Harness(CASES[name], tmp_path, seed=1)
     harness.kill(2)
