@@ -164,6 +164,7 @@ def test_progress_counts_the_seconds(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert seen == [0.2, 0.4]
 
 
+@pytest.mark.slow
 def test_a_long_write_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
     device = load("paper-6x6")
 

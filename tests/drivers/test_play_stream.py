@@ -160,6 +160,7 @@ def test_what_arrives_is_what_was_written(tmp_path: Path, name: str) -> None:
     assert report.late_s.keys() == {0, 1, 2}
 
 
+@pytest.mark.slow
 def test_a_bad_line_and_a_pulled_cable(tmp_path: Path) -> None:
     device, clock = load_device("paper-6x6"), SharedClock()
     sent, arrived, link = tmp_path / "sent.wav", tmp_path / "arrived.wav", tmp_path / "port"

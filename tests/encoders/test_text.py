@@ -284,6 +284,7 @@ def test_a_megabyte_of_white_space_is_passed_over(run):
     assert scene.text_frames.check().text_equal
 
 
+@pytest.mark.slow
 def test_a_long_line_without_a_space_is_complete():
     text = "abcdefghij" * 20_000
     scene = encode_text(text, GRID, TextOptions(table="en-ueb-g1.ctb"))

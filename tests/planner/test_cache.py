@@ -243,6 +243,7 @@ print(sum(len(f.states) for f in plan_scene(scene, load_device("linked-6x6")).fr
 """
 
 
+@pytest.mark.slow
 def test_two_processes_at_once() -> None:
     command = [sys.executable, "-W", "error", "-c", PROCESS]
     both = [

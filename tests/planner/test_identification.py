@@ -258,6 +258,7 @@ def test_a_stage_learns_nothing_where_it_does_not_move() -> None:
     np.testing.assert_array_equal(estimate.after(page, SensorNoise(0.01)).covariance, estimate.covariance)
 
 
+@pytest.mark.slow
 def test_a_sensor_whose_noise_is_the_same_everywhere_tells_less_of_idle_actuators() -> None:
     profile = of_rows(LINKED, 20)
     hidden = HiddenDevice(drawn(profile, 1, f0=0.01), 0.0, np.random.default_rng(2), floor=0.01)

@@ -163,6 +163,7 @@ def test_devices_that_bear_it_are_planned_as_they_were(device: Device) -> None:
     assert aimed.spread.yield_ == 1.0
 
 
+@pytest.mark.slow
 def test_a_contrast_that_is_asked_for_is_what_devices_must_keep() -> None:
     device = spread(LINKED, 0.003)
     shares = []

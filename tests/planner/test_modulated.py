@@ -120,6 +120,7 @@ def test_over_links_every_actuator_swells_as_it_was_asked_to() -> None:
     assert np.all(size.min(axis=1) < 0.03 * size.max(axis=1))
 
 
+@pytest.mark.slow
 def test_one_lam_lets_the_last_cell_beat_and_no_other() -> None:
     device = load_device(ONE_LAM)
     plan = plan_of([0, 0, 0, 0, 1, 1], device=device)

@@ -211,6 +211,7 @@ def test_frames_are_planned_as_they_are_taken(device: Device) -> None:
     assert scene.taken <= 20
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_frames() -> None:
     plan = plan_scene(Scene(GridShape(6, 6), Counted(lambda: endless(12_000))), PAPER)
     tracemalloc.start()

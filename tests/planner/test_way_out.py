@@ -161,6 +161,7 @@ def shown(device: Device, patterns: list[TargetPattern], dwell_s: float, folder:
     return [frame.settled_s - frame.start_s for frame in frames]
 
 
+@pytest.mark.slow
 def test_from_wave_to_wave_and_to_dots_through_the_file(tmp_path: Path) -> None:
     """Lag, level and direction of a wave change, and dots follow."""
     patterns = [

@@ -235,7 +235,7 @@ def test_points_that_fit_no_chain_write_nothing(tmp_path: Path) -> None:
     assert not out.exists()
 
 
-@pytest.mark.parametrize("mistake", [np.degrees, np.negative])
+@pytest.mark.parametrize("mistake", [pytest.param(np.degrees, marks=pytest.mark.slow), np.negative])
 def test_phases_in_degrees_or_turned_round_write_nothing(tmp_path: Path, mistake: np.ufunc) -> None:
     source = altered(tmp_path / "sweep.csv", lambda row: row.__setitem__(5, f"{mistake(float(row[5])):.4f}"))
     out = tmp_path / "my.yaml"

@@ -165,6 +165,7 @@ def ascii_only(tmp_path_factory: pytest.TempPathFactory):
     return call
 
 
+@pytest.mark.slow
 def test_an_ascii_locale_keeps_nothing_from_working(ascii_only) -> None:
     ascii_only("text", "Grüße", "-o", "ü.wav")
     assert json.loads(ascii_only("verify", "ü.wav", "--json"))["felt_text"] == "Grüße"

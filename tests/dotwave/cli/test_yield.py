@@ -46,6 +46,7 @@ def test_the_sentence_says_the_share_and_the_accuracy_that_more_takes() -> None:
     assert "Ok on 89 of 100" in replace(REPORT, share=0.8999).as_text()
 
 
+@pytest.mark.slow
 def test_exit_codes_follow_the_yield(dotwave: Call, device: Path, tmp_path: Path) -> None:
     reached = dotwave("text", "Hello", "-d", device, "--yield", "0.8", "-o", tmp_path / "a.wav")
     assert reached.code == 0, reached.err
