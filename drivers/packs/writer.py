@@ -66,9 +66,16 @@ class PackWriter:
     ----------
     entries : how many were taken.
     pieces : of curves that were fitted.
+
+    Raises
+    ------
+    WaveformError
+        When the device is coupled in two dimensions: the events of a pack set links along rows only.
     """
 
     def __init__(self, device: Device) -> None:
+        if device.grid:
+            raise WaveformError(f"{device.name}: a pack sets links along rows only, not downwards; write a .wav")
         self._device = device
         self._body = bytearray()
         self._kept: dict[bytes, int] = {}

@@ -291,3 +291,8 @@ def test_hostile_packs_lead_the_reader_in_c_nowhere(tmp_path: Path) -> None:
         paths[-1].write_bytes(raw)
     told = hear("read-pack", "paper_6x6", *paths)
     assert (told.returncode, told.stderr) == (1, "")
+
+
+def test_links_downwards_are_refused() -> None:
+    with pytest.raises(WaveformError, match="linked-grid-6x6: a pack sets links along rows only"):
+        PackWriter(load_device("linked-grid-6x6"))
