@@ -16,7 +16,7 @@ from .keys import Keys
 from .results import Results
 from .tasks import Tasks
 
-__all__ = ["PAGES", "Studio", "StudioPage", "pages", "show", "studio_of"]
+__all__ = ["PAGES", "Studio", "StudioPage", "pages", "result_values", "show", "studio_of"]
 
 PAGES = ("write", "pictures", "device", "chain", "tradeoff", "play")
 """Modules of `dotwave.studio.pages`, in the order of the navigation."""
@@ -69,6 +69,19 @@ def studio_of(request: Request) -> Studio:
     """What all pages share."""
     found: Studio = request.app.state.studio
     return found
+
+
+def result_values(request: Request) -> dict[str, Any]:
+    """The result that an address names, what came of it, and the work that makes it.
+
+    Raises
+    ------
+    AppError
+        When there is no such result.
+    """
+    studio = studio_of(request)
+    result = studio.results.find(request.path_params["name"])
+    return {"result": result, "answer": result.answer(), "running": studio.tasks.of(result.name)}
 
 
 def show(

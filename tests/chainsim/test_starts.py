@@ -151,6 +151,7 @@ RAMPED = Setting.of(
 )
 
 
+@pytest.mark.slow
 def test_a_ramp_past_a_fold_ends_where_the_full_equations_say():
     steady = solve(PAPER, RAMPED, tol=1e-6, rung="harmonic_balance", start="ramp")
     assert list(steady.outcome) == [Outcome.NO_CONVERGENCE, Outcome.NO_CONVERGENCE, Outcome.OK]

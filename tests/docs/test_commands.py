@@ -115,7 +115,7 @@ def runnable() -> list[Path]:
     return [README, *(DOCS / f"{name}.md" for name in ("tutorial", "playing", "devices", "apps"))]
 
 
-@pytest.mark.parametrize("page", one_in(3, runnable()), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", one_in(5, runnable()), ids=lambda page: page.name)
 def test_the_cheap_ones_run_one_after_another(page: Path, workshop: Path) -> None:
     ran = 0
     for line in dict.fromkeys(shown([page])):

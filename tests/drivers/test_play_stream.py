@@ -175,6 +175,7 @@ def test_a_bad_line_and_a_pulled_cable(tmp_path: Path) -> None:
     assert not link.exists()
 
 
+@pytest.mark.slow
 def test_the_cable_stays_out(tmp_path: Path) -> None:
     device, clock = load_device("independent-6x6"), SharedClock()
     sent, link = tmp_path / "sent.wav", tmp_path / "port"

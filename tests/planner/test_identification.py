@@ -68,7 +68,7 @@ def hidden_of(profile: Device, *, f0: float = 0.01, noise: float = 0.01, seed: i
 COUNTS = [20, pytest.param(60, marks=pytest.mark.slow)]
 
 
-@pytest.mark.parametrize("phases", [True, False], ids=["phasors", "amplitudes"])
+@pytest.mark.parametrize("phases", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["phasors", "amplitudes"])
 @pytest.mark.parametrize("count", COUNTS)
 def test_the_same_page_again_is_right(count: int, phases: bool) -> None:
     profile = of_rows(LINKED, count)

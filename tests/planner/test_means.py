@@ -86,6 +86,7 @@ def test_a_stated_spread_serves_the_wish(frequency: float, ok: float, right: flo
     assert aimed.spread.yield_ == max(one.share for one in aimed.spread.tried)
 
 
+@pytest.mark.slow
 def test_the_search_ends_at_the_yield_that_is_asked_for() -> None:
     device = spread(LINKED, 0.01)
     counts = []
@@ -99,6 +100,7 @@ def test_the_search_ends_at_the_yield_that_is_asked_for() -> None:
     assert counts[0] < counts[1] < counts[2]
 
 
+@pytest.mark.slow
 def test_every_page_of_a_text_can_still_be_reached() -> None:
     device = spread(LINKED, 0.01)
     plain, aimed = (list(hello(one, "Hello my dear").frames) for one in (LINKED, device))

@@ -166,6 +166,7 @@ def test_deflections_that_cannot_be_held_have_no_way():
     assert ways_of_deflections(np.ones((1, 6)), device) == ([], len(PERIODS))
 
 
+@pytest.mark.slow
 def test_waves_trade_time_against_drive():
     device = load_device("paper-6x6")
     pattern = plane_wave(SHAPE, lag_deg=60, level=0.2)

@@ -15,7 +15,7 @@ from drivers import atomic_file
 
 from ...errors import AppError, bad_input
 from ..devices import PROFILE, device_choices, device_path
-from ..page import Studio, StudioPage, show, studio_of
+from ..page import Studio, StudioPage, result_values, show, studio_of
 from ..profile_form import profile_fields, profile_of
 from ..results import Result
 from ..uploads import words_of_form
@@ -60,10 +60,7 @@ def _saved(studio: Studio, typed: dict[str, str]) -> Result:
 
 
 def _shown(request: Request) -> Response:
-    studio = studio_of(request)
-    result = studio.results.find(request.path_params["name"])
-    values = {"result": result, "answer": result.answer(), "running": studio.tasks.of(result.name)}
-    return show(request, "device_saved.html", values, here="device")
+    return show(request, "device_saved.html", result_values(request), here="device")
 
 
 PAGE = StudioPage(

@@ -15,7 +15,7 @@ from drivers import serial_ports
 from ...api.sinks import open as open_sink
 from ...errors import AppError, bad_input
 from ..devices import device_choices, device_path
-from ..page import Studio, StudioPage, show, studio_of
+from ..page import Studio, StudioPage, result_values, show, studio_of
 from ..results import Result
 from ..uploads import words_of_form
 
@@ -115,10 +115,7 @@ WORKS = {"play": _playing, "emulator": _standing_in, "live": _reading}
 
 
 def _shown(request: Request) -> Response:
-    studio = studio_of(request)
-    result = studio.results.find(request.path_params["name"])
-    values = {"result": result, "answer": result.answer(), "running": studio.tasks.of(result.name)}
-    return show(request, "playing.html", values, here="play")
+    return show(request, "playing.html", result_values(request), here="play")
 
 
 PAGE = StudioPage(

@@ -14,7 +14,7 @@ from starlette.routing import Route
 from ...errors import AppError, bad_input
 from ..devices import device_choices, device_path
 from ..fields import NumberField
-from ..page import Studio, StudioPage, show, studio_of
+from ..page import Studio, StudioPage, result_values, show, studio_of
 from ..results import Result
 from ..uploads import words_of_form
 
@@ -58,12 +58,8 @@ def _asked(studio: Studio, given: Mapping[str, str]) -> Result:
 
 
 def _shown(request: Request) -> Response:
-    studio = studio_of(request)
-    result = studio.results.find(request.path_params["name"])
-    answer = result.answer()
-    values: dict[str, Any] = {"result": result, "answer": answer, "running": studio.tasks.of(result.name), "dots": []}
-    if answer:
-        values["dots"] = _places(answer["rows"])
+    values = result_values(request)
+    values["dots"] = _places(values["answer"]["rows"]) if values["answer"] else []
     return show(request, "traded.html", values, here="tradeoff")
 
 

@@ -15,7 +15,7 @@ from encoders import PageNumbering, Presentation, TableInfo, Undefined, list_tab
 
 from ...errors import AppError, bad_input
 from ..devices import device_choices, device_path
-from ..page import StudioPage, show, studio_of
+from ..page import StudioPage, result_values, show, studio_of
 from ..results import Result
 from ..uploads import ending_of, file_of, keep, words_of_form
 
@@ -89,16 +89,12 @@ async def _asked(request: Request, form: FormData, given: dict[str, str]) -> Res
 
 
 def _shown(request: Request) -> Response:
-    studio = studio_of(request)
-    result = studio.results.find(request.path_params["name"])
-    answer = result.answer()
+    values = result_values(request)
     first = request.query_params.get("from", "1")
     start = max(1, int(first)) if first.isdecimal() and len(first) < 9 else 1
-    frames = answer["frames"] if answer else []
-    values = {
-        "result": result, "answer": answer, "running": studio.tasks.of(result.name), "first": start,
-        "frames": frames[start - 1 : start - 1 + FRAMES_AT_A_TIME], "step": FRAMES_AT_A_TIME,
-    }  # fmt: skip
+    frames = values["answer"]["frames"] if values["answer"] else []
+    shown = frames[start - 1 : start - 1 + FRAMES_AT_A_TIME]
+    values |= {"first": start, "frames": shown, "step": FRAMES_AT_A_TIME}
     return show(request, "written.html", values, here="write")
 
 

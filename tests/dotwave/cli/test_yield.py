@@ -79,6 +79,7 @@ def test_a_yield_needs_a_spread(dotwave: Call) -> None:
     assert dotwave("text", "Hello", "-d", "linked-6x6", "--yield", "1.5").code == 2
 
 
+@pytest.mark.slow
 def test_a_job_asks_for_a_yield_and_the_command_line_comes_before_it(dotwave: Call, device: Path) -> None:
     job = device.with_name("job.yaml")
     job.write_text("device: loose.yaml\nyield: 0.9999\nsequence:\n  - text: Hello\n", encoding="utf-8")

@@ -16,7 +16,7 @@ SHORT = IconOptions(device="independent-6x6", workers=1, waveforms=True, dwell_s
 LONG = replace(SHORT, dwell_s=0.4)
 
 
-@pytest.mark.parametrize("at", [1, 2, 3])
+@pytest.mark.parametrize("at", [1, *(pytest.param(at, marks=pytest.mark.slow) for at in (2, 3))])
 def test_a_run_that_ends_before_it_is_noted_misleads_none(
     at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

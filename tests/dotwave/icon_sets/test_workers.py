@@ -225,6 +225,7 @@ def heavy(count: int) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">{circle * count}</svg>'
 
 
+@pytest.mark.slow
 def test_an_icon_that_takes_too_long_is_reported_and_tried_again(tmp_path: Path) -> None:
     folder, out = tmp_path / "set", tmp_path / "out"
     folder.mkdir()

@@ -45,6 +45,7 @@ def files(out: Path, suffixes: Sequence[str] = (".wav", ".json")) -> dict[str, b
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.suffix in suffixes}
 
 
+@pytest.mark.slow
 def test_each_file_is_rendered_as_it_is_alone(folder: Path, tmp_path: Path) -> None:
     report = rendered(folder, tmp_path / "out", workers=2)
     assert report.ok
@@ -145,6 +146,7 @@ def test_its_own_output_is_not_read(folder: Path) -> None:
     assert len(rendered(folder, out, waveforms=False).texts) == 3
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_a_manifest_and_the_same_call_goes_on(folder: Path, tmp_path: Path) -> None:
     for number in range(20):
         (folder / f"{number}.txt").write_text(f"text {number} " * 20, encoding="utf-8")

@@ -20,6 +20,7 @@ CHAPTER = 2000
 MOST_BYTES = 600_000
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_a_book(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("encoders.braille.text.MOST_KEPT", 0)
     rng = random.Random(7)
