@@ -74,7 +74,7 @@ def offered(words: str, folder: Path, shell: str = "bash") -> subprocess.Complet
     ("words", "answers"),
     [
         ("dotwave ver", {"verify"}),
-        ("dotwave text Hello --device linked", {"linked-40x96", "linked-6x6"}),
+        ("dotwave text Hello --device linked", {"linked-40x96", "linked-6x6", "linked-grid-6x6"}),
         ("dotwave devices ultra", {"ultrasonic-6x6"}),
         ("dotwave verify ", {"a.wav"}),
         ("dotwave render ", {"job.yaml"}),
