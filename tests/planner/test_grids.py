@@ -117,6 +117,16 @@ def test_dots_under_one_lam_each_way_are_refused_with_the_nearest() -> None:
     assert np.abs(frame.states[0].phasor[:6]) / WAVES.full_scale == pytest.approx([1, 0, 1, 0, 1, 0], abs=1e-6)
 
 
+def test_a_wave_that_is_no_stable_motion_is_refused() -> None:
+    loud = WAVES.model_copy(update={"full_scale": 0.1})
+    frame = planned(loud, plane_wave(SHAPE, lag_deg=60, row_lag_deg=60))
+    assert frame.outcome is Outcome.UNREACHABLE
+    assert "no stable motion" in frame.note
+    assert frame.states[0].margins.multiplier > 1
+    # As the condition of a chain says (theory.md section 2.2), in the direction that carries nearly all of it.
+    assert 1.5 * 0.1**2 * math.sin(math.radians(60)) * math.cos(math.radians(60)) > loud.delta
+
+
 def test_walking_bars_are_refused() -> None:
     frame = planned(WAVES, walking_bars(SHAPE, width=3))
     assert frame.outcome is Outcome.UNREACHABLE
