@@ -30,6 +30,8 @@ Complexes = NDArray[np.complex128]
 WEAKER = 0.1
 # Lags nearer to 0 or pi than this carry nothing.
 LEAST_LAG = 1e-3
+# Drives this small, as a part of the largest, are rounding.
+EXACT = 1e-9
 WALKS_NOT = "bars walk along chains that stand alone, and its rows are coupled; it lacks separate rows"
 # Where any phases will do.
 FREE_LAG = math.pi / 2
@@ -67,11 +69,15 @@ class GridWaves(RisingFamily):
         drive = np.zeros_like(asked)
         for at in device.driven:
             drive[at] = asked[at]
-        phasor = motion_under(device, drive, links, wave.omega)
+        # Where the drives that are there are all that is asked, the wave stands, on whichever branch it is.
+        whole = wish.plain and np.abs(asked - drive).max() <= EXACT * np.abs(asked).max()
+        phasor = wish.plane if whole else motion_under(device, drive, links, wave.omega)
         epsilon = np.array([drive[at] for at in device.driven])
         margins = margins_of(device, epsilon, phasor, links, wave.omega)
         error = (wish.error(phasor) + noise_of(device, links)) / device.full_scale
         lacking = _lacking(device, wish, wave, error) or lacking_of(margins)
+        if not lacking and margins.multiplier >= 1:
+            lacking = "it is no stable motion; it lacks damping, or linearity (a smaller beta)"
         if isinstance(target, WalkingTarget):
             lacking = WALKS_NOT
         return OperatingPoint(

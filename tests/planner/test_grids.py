@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dotwave as dw
 from chainsim import Device, Outcome, load_device
 from dotwave.as_built.study import AsBuiltStudy, verify_as_built
 from dotwave.errors import AppError
@@ -16,10 +17,13 @@ from dotwave.studies.tradeoff import trade_frame
 from dotwave.verification import verify
 from drivers import ControllerSpec, VirtualController, read_waveform, write_plan
 from drivers.protocol.outgoing import UnfitController, check_fit
-from encoders import Frame, GridShape, Scene, TargetPattern, bars, plane_wave, walking_bars
+from encoders import Frame, GridShape, Scene, TargetPattern, bars, levels, plane_wave, rings, slanted_bars, walking_bars
 from planner import DwellTooShort, FramePlan, plan_scene
 from planner.analysis.effects import Linearisation
 from planner.closed_forms import grid
+from planner.closed_forms.ringing import ringing
+from planner.families import family_of, row_of
+from planner.targets import AmplitudeTarget
 from tests.support.grid_motion import felt_after
 
 SHAPE = GridShape(6, 6)
@@ -113,6 +117,16 @@ def test_dots_under_one_lam_each_way_are_refused_with_the_nearest() -> None:
     assert np.abs(frame.states[0].phasor[:6]) / WAVES.full_scale == pytest.approx([1, 0, 1, 0, 1, 0], abs=1e-6)
 
 
+def test_a_wave_that_is_no_stable_motion_is_refused() -> None:
+    loud = WAVES.model_copy(update={"full_scale": 0.1})
+    frame = planned(loud, plane_wave(SHAPE, lag_deg=60, row_lag_deg=60))
+    assert frame.outcome is Outcome.UNREACHABLE
+    assert "no stable motion" in frame.note
+    assert frame.states[0].margins.multiplier > 1
+    # As the condition of a chain says (theory.md section 2.2), in the direction that carries nearly all of it.
+    assert 1.5 * 0.1**2 * math.sin(math.radians(60)) * math.cos(math.radians(60)) > loud.delta
+
+
 def test_walking_bars_are_refused() -> None:
     frame = planned(WAVES, walking_bars(SHAPE, width=3))
     assert frame.outcome is Outcome.UNREACHABLE
@@ -179,6 +193,43 @@ def test_too_many_stages_for_one_drive_are_refused_with_what_lacks() -> None:
     assert frame.outcome is Outcome.UNREACHABLE
     assert "it lacks drives" in frame.note
     assert np.abs(frame.states[0].phasor) == pytest.approx(np.full(36, LINKED.full_scale))
+
+
+def test_a_text_is_felt_through_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "hello.npz"
+    dw.plan(dw.text("Hi all", LINKED), LINKED).waveform().write(path)
+    report = verify(path)
+    assert report.ok
+    assert report.felt_text == "Hi all"
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        slanted_bars(SHAPE, angle_deg=30, width=1, gap=1.5),
+        rings(SHAPE, row=2, col=3, width=1, gap=1),
+        levels(np.outer(0.6 ** np.arange(6), 0.6 ** np.arange(6))),
+    ],
+    ids=["slanted bars", "rings", "levels"],
+)
+@pytest.mark.parametrize("where", ["corner", "column", "border"])
+def test_bars_rings_and_levels_are_held_by_links(pattern: TargetPattern, where: str) -> None:
+    device = drives(LINKED, where)
+    family = family_of(row_of(AmplitudeTarget, device), device, 20.0)
+    wished = np.abs(pattern.amplitude).ravel()
+    (point,) = family.points([family.held(AmplitudeTarget.of(wished), started=False)])
+    assert point.outcome is Outcome.OK, point.lacking
+    felt = np.abs(point.phasor) / LINKED.full_scale
+    assert felt[wished > 0.1] == pytest.approx(wished[wished > 0.1], abs=1e-3)
+    assert felt[wished <= 0.1].max(initial=0.0) < 0.11
+
+
+def test_deviations_ring_on_as_the_links_of_a_grid_say() -> None:
+    rng = np.random.default_rng(5)
+    links = grid.GridLinks.of(WAVES, rng.uniform(0, 0.3, WAVES.links))
+    matrix = WAVES.chain.law.matrix(links.right.reshape(1, -1), links.down.reshape(1, -1))[0]
+    found = ringing(WAVES.chain, links.flat, np.zeros(36))
+    assert found[36:, :36] == pytest.approx(-np.eye(36) - matrix, abs=1e-12)
 
 
 def test_what_is_for_chains_says_so(tmp_path: Path) -> None:
